@@ -26,6 +26,10 @@ module polydem_prescribed_motion
       real(wp) :: frequency = 0.0_wp
       !> Time at which the motion begins [s]
       real(wp) :: start = 0.0_wp
+      !> Time at which the motion ends [s]
+      real(wp) :: end = huge(1.0_wp)
+      !> Number of the stage of the run in which it acts, which sets start and end; 0: it depends on no stage
+      integer(ip) :: stage = 0_ip
       !> Time from the start to the full rate [s]
       real(wp) :: ramp = 0.0_wp
    end type motion_t
@@ -189,8 +193,20 @@ contains
       end if
    end function shift_at
 
-   !> The ramp of a motion at a time
+   !> The ramp of a motion at a time. From its end on the bodies rest in the pose that they have reached.
    pure type(ramp_t) function ramp_at(motion, time) result(ramp)
+      type(motion_t), intent(in) :: motion
+      !> Time since the start of the run [s]
+      real(wp), intent(in) :: time
+
+      ramp = rise_at(motion, min(time, motion%end))
+      if (time < motion%end) return
+      ramp%factor = 0.0_wp
+      ramp%growth = 0.0_wp
+   end function ramp_at
+
+   !> The ramp of a motion without an end
+   pure type(ramp_t) function rise_at(motion, time) result(ramp)
       type(motion_t), intent(in) :: motion
       !> Time since the start of the run [s]
       real(wp), intent(in) :: time
@@ -204,6 +220,6 @@ contains
          ramp = ramp_t(motion%ramp*u*u*u*(1.0_wp - 0.5_wp*u), u*u*(3.0_wp - 2.0_wp*u), &
                        6.0_wp*u*(1.0_wp - u)/motion%ramp)
       end if
-   end function ramp_at
+   end function rise_at
 
 end module polydem_prescribed_motion

@@ -127,7 +127,9 @@ contains
                reach = reach + 2.0_wp*(arm + reach)
             case ('translation')
                speed = speed + hypotenuse(motion%velocity(1), motion%velocity(2))
-               reach = reach + hypotenuse(motion%velocity(1), motion%velocity(2))*max(0.0_wp, duration - motion%start)
+               ! The start of a motion in a stage is not known yet.
+               reach = reach + hypotenuse(motion%velocity(1), motion%velocity(2)) &
+                       *max(0.0_wp, duration - merge(0.0_wp, motion%start, motion%stage > 0_ip))
             case default
                speed = speed + motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
                reach = reach + hypotenuse(motion%amplitude(1), motion%amplitude(2))

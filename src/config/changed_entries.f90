@@ -1,16 +1,21 @@
 !> Comparison of the settings of two runs: a text that lists the entries that differ.
 module polydem_changed_entries
+   use polydem_kinds, only: wp
    use polydem_namelist_entries, only: is_repeatable
    use polydem_strings, only: text_t
    implicit none
    private
-   public :: changed_entries
+   public :: changed_entries, is_extension
 
    !> Entries that do not affect the computed result
    character(len=*), parameter :: harmless(*) = [character(len=24) :: 'output.folder', 'checkpoint.steps', &
                                                  'checkpoint.interval', 'checkpoint.wall_interval', &
-                                                 'decomposition.margin', 'decomposition.balance', &
-                                                 'decomposition.imbalance']
+                                                 'checkpoint.at_end', 'decomposition.margin', &
+                                                 'decomposition.balance', 'decomposition.imbalance']
+   !> Entry that a run may increase while it goes on
+   character(len=*), parameter :: duration = 'integrate.duration'
+   !> Beginning of the names of entries of stages, which may follow those of the earlier run
+   character(len=*), parameter :: stage = 'stage.'
 
 contains
 
@@ -40,6 +45,55 @@ contains
          call add(new_name(k)%text//' was not used and is '//new_value(k)%text, text)
       end do
    end function changed_entries
+
+   !> Whether the present settings are those of the earlier run but for a longer duration, or for more stages. At the
+   !> same time step both runs then have the same states as long as both last
+   pure logical function is_extension(former, present)
+      !> Resolved settings of the earlier run, one entry per line, as in `settings_t`
+      character(len=*), intent(in) :: former
+      !> Resolved settings of the present run, likewise
+      character(len=*), intent(in) :: present
+      type(text_t), allocatable :: old_name(:), old_value(:), new_name(:), new_value(:)
+      integer :: j, k
+
+      call list_entries(former, old_name, old_value)
+      call list_entries(present, new_name, new_value)
+      is_extension = .false.
+      do k = 1, size(new_name)
+         if (place_of(new_name(k)%text, old_name) > 0) cycle
+         ! Entries of a stage that follows the former ones
+         if (index(new_name(k)%text, stage) /= 1) return
+         if (any([(index(old_name(j)%text, group_of(new_name(k)%text)) == 1, j=1, size(old_name))])) return
+      end do
+      do k = 1, size(old_name)
+         j = place_of(old_name(k)%text, new_name)
+         if (j == 0) return
+         if (new_value(j)%text == old_value(k)%text) cycle
+         if (old_name(k)%text == duration) then
+            if (.not. number(new_value(j)%text) > number(old_value(k)%text)) return
+         else if (old_name(k)%text /= stage//'name' .or. index(new_value(j)%text, old_value(k)%text//', ') /= 1) then
+            return
+         end if
+         is_extension = .true.
+      end do
+   end function is_extension
+
+   !> Beginning of a name with the group and the name of the instance, with the dot behind it
+   pure function group_of(name) result(group)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: group
+
+      group = name(:index(name, '.', back=.true.))
+   end function group_of
+
+   !> Value of a resolved entry with one number
+   pure real(wp) function number(text)
+      character(len=*), intent(in) :: text
+      integer :: status
+
+      read (text, *, iostat=status) number
+      if (status /= 0) number = 0.0_wp
+   end function number
 
    !> Append a sentence; '; ' separates sentences.
    pure subroutine add(sentence, text)

@@ -56,7 +56,7 @@ contains
       associate (scene => instances(index_of_instance(instances, 'scene')))
          if (settings%scene%name /= 'parts' .and. settings%scene%name /= 'file') then
             kinds = [character(len=6) :: 'grains', 'wall']
-            do k = 1, 2
+            do k = 1, merge(1, 2, settings%scene%name == 'result')
                place = findloc(instances%group == kinds(k), .true., 1)
                if (place > 0) call raise(error, input_error, instances(place)%place//': &'//trim(kinds(k))//' '// &
                   instances(place)%name//' cannot be combined with name = '//quoted(settings%scene%name)// &
@@ -143,14 +143,17 @@ contains
 
       associate (wall => settings%wall(w), instance => instances(index_of_instance(instances, 'wall', &
                                                                                    settings%wall(w)%name)))
-         if (settings%scene%bodies_file == '') call blame(instance, 'bodies', &
+         if (settings%scene%bodies_file == '' .and. settings%scene%name /= 'result') call blame(instance, 'bodies', &
             'needs ''bodies_file'' in &scene, which has these bodies', error)
          is_used = .false.
          do k = 1, size(settings%motion)
             is_used = is_used .or. settings%motion(k)%wall == wall%name
          end do
+         do k = 1, size(settings%stage)
+            is_used = is_used .or. any([settings%stage(k)%wall, settings%stage(k)%opposite] == wall%name)
+         end do
          if (.not. is_used) call blame(instance, 'outline', '= ''bodies'' gives a name to bodies that no '// &
-            '&motion uses; leave out this wall, or write wall = '//quoted(wall%name)//' in a &motion', error)
+            '&motion or &stage uses; leave out this wall, or write wall = '//quoted(wall%name)//' in a &motion', error)
          do k = 1, w - 1
             do j = 1, size(settings%wall(k)%bodies)
                if (any(wall%bodies == settings%wall(k)%bodies(j))) call blame(instance, 'bodies', 'contains body '// &

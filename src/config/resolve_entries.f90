@@ -49,7 +49,7 @@ contains
       if (allocated(error)) return
       do k = 1, size(instances)
          do row = lbound(instances(k)%values, 1), ubound(instances(k)%values, 1)
-            call resolve_row(of_bench, row, instances(k), error)
+            call resolve_row(of_bench, row, any(instances%group == 'stage'), instances(k), error)
             if (allocated(error)) return
          end do
       end do
@@ -64,9 +64,11 @@ contains
    end subroutine resolve_entries
 
    !> Find the value of a row: the given value, or the default.
-   pure subroutine resolve_row(of_bench, row, instance, error)
+   pure subroutine resolve_row(of_bench, row, has_stages, instance, error)
       logical, intent(in) :: of_bench
       integer, intent(in) :: row
+      !> Whether there are groups &stage, which have durations of their own
+      logical, intent(in) :: has_stages
       type(instance_t), intent(inout) :: instance
       type(error_t), allocatable, intent(inout) :: error
       integer :: home
@@ -75,6 +77,14 @@ contains
          home = first_row(entry%group, entry%key)
          value%is_active = (entry%group == bench_group) .eqv. of_bench
          if (value%is_active) value%is_active = is_needed(entry, instance)
+         if (value%is_active .and. has_stages .and. entry%group == 'integrate' .and. entry%key == 'duration') then
+            value%is_active = .false.
+            if (allocated(instance%given(home)%values)) then
+               call raise(error, input_error, instance%given(home)%place//': ''duration'' in &integrate cannot be '// &
+                  'combined with groups &stage, which have durations of their own; omit it')
+               return
+            end if
+         end if
          if (value%is_active .and. allocated(instance%given(home)%values)) then
             call read_value(entry, instance%given(home), value, error)
          else if (is_optional(entry)) then

@@ -132,12 +132,14 @@ contains
    end subroutine write_interval
 
    !> Update the progress line, a few times per second at most. A no-op unless the screen is an interactive terminal.
-   subroutine show_progress(self, step, n_steps)
+   subroutine show_progress(self, step, n_steps, stage)
       class(log_t), intent(inout) :: self
       !> Current step
       integer(lp), intent(in) :: step
       !> Number of steps of the whole run
       integer(lp), intent(in) :: n_steps
+      !> Name of the present stage of the run; absent: there are no stages
+      character(len=*), intent(in), optional :: stage
       character(len=64) :: text
       real(dp) :: now, rate
 
@@ -147,7 +149,11 @@ contains
       rate = rate_until(self, step, now)
       write (text, '(i10,a,i0,a,f5.1,2a)') step, ' of ', n_steps, ' steps,', percent(step, n_steps), &
          '%, to go', time_to_go(n_steps - step, rate)
-      call write_live(self, trim(text))
+      if (present(stage)) then
+         call write_live(self, trim(text)//', '//stage)
+      else
+         call write_live(self, trim(text))
+      end if
       self%live_seconds = now
    end subroutine show_progress
 

@@ -92,6 +92,8 @@ contains
       call provenance%set('run', '')
       call provenance%set('parent', 'none')
       call provenance%set('scene', '')
+      ! Names of walls, with the identifiers of their bodies
+      call provenance%set('walls', '')
       ! Why the run has so many threads
       call provenance%set('thread_choice', '')
       provenance%cores = cores_online()

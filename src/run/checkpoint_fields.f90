@@ -5,6 +5,7 @@
 !> neighbour finders. After a restart the first search starts without pairs. The pairs that it finds again get their
 !> contact history. A hash of the bodies at the start guards against the checkpoint of another run.
 module polydem_checkpoint_fields
+   use polydem_begin_stage, only: continue_stages
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
@@ -15,11 +16,12 @@ module polydem_checkpoint_fields
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_packed_state, only: find_walls
    use polydem_replace_bodies, only: settle_bodies
+   use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    implicit none
    private
-   public :: attempts_t, serialize_run, serialize_progress
+   public :: attempts_t, serialize_run, serialize_progress, read_pairs
 
    !> Number of pairs that are read at a time
    integer(lp), parameter :: most_rows = 65536_lp
@@ -72,6 +74,7 @@ contains
          call read_pairs(serializer, s)
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
+         call continue_stages(s, serializer%error)
          call find_walls(s, former)
          call settle_bodies(s, serializer%error)
       end associate
@@ -88,6 +91,7 @@ contains
       call serialize_progress(serializer, simulation%step, attempts)
       call serialize_monitor(monitor, serializer)
       associate (s => simulation)
+         call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
@@ -132,7 +136,9 @@ contains
 
    !> Read the contact history of the pairs that have a body of this rank. All pairs are read, some at a time.
    subroutine read_pairs(serializer, s)
+      !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
+      !> The simulation, which receives the history
       type(simulation_t), intent(inout) :: s
       type(packed_history_t) :: part
       integer(ip), allocatable :: owned(:)

@@ -5,6 +5,7 @@ module polydem_description
    use polydem_log, only: log_t
    use polydem_overlap_table, only: write_overlap_table
    use polydem_result_files, only: overlaps_name
+   use polydem_run_duration, only: longest_run
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text, counted, join
    use polydem_scene_measures, only: scene_measures_t
@@ -51,8 +52,7 @@ contains
             ' of the step without damping; shorter contacts allow more)')
          if (measures%contacts > 0_lp) call log%write_line('           '//to_text(s%dt/measures%stable_step, 3)// &
             ' of the stable time step '//to_text(measures%stable_step)//' s of the initial contacts')
-         call log%write_line('duration   '//to_text(real(s%n_steps, wp)*s%dt)//' s, '//to_text(s%n_steps)// &
-                             ' steps'//rounding_text(real(s%n_steps, wp)*s%dt, s%settings%integrate%duration))
+         call log%write_line('duration   '//duration_text(s))
          if (measures%contacts > 0_lp) then
             call log%write_line('at start   '//counted(measures%contacts, 'contact')//', the deepest '// &
                                 measures%longest_depth)
@@ -212,15 +212,22 @@ contains
       end associate
    end function pair_text
 
-   !> Remark if the requested duration is not a whole number of steps; else empty
-   function rounding_text(duration, wanted) result(text)
-      real(wp), intent(in) :: duration, wanted
+   !> Duration and number of steps, and the requested duration if it is another one
+   function duration_text(simulation) result(text)
+      type(simulation_t), intent(in) :: simulation
       character(len=:), allocatable :: text
+      real(wp) :: duration
 
-      text = ''
-      if (abs(duration - wanted) > 1.0e-6_wp*wanted) text = ' (requested: '//to_text(wanted)// &
-                                                            ' s, not a whole number of steps)'
-   end function rounding_text
+      duration = real(simulation%n_steps, wp)*simulation%dt
+      text = to_text(duration)//' s, '//to_text(simulation%n_steps)//' steps'
+      associate (n => size(simulation%settings%stage, kind=lp), wanted => longest_run(simulation%settings))
+         if (n > 0_lp) then
+            text = 'at most '//text//' in '//counted(n, 'stage')
+         else if (abs(duration - wanted) > 1.0e-6_wp*wanted) then
+            text = text//' (requested: '//to_text(wanted)//' s, not a whole number of steps)'
+         end if
+      end associate
+   end function duration_text
 
    !> ', gravity' if there is gravity; else empty
    function gravity_text(simulation) result(text)

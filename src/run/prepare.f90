@@ -19,6 +19,8 @@ module polydem_prepare
    use polydem_run_output, only: choose_intervals
    use polydem_settings, only: settings_t
    use polydem_start, only: build_start, recall
+   use polydem_start_from, only: find_origin, origin_t
+   use polydem_wall_names, only: wall_names_text
    implicit none
    private
    public :: build_and_lock, prepare
@@ -92,19 +94,21 @@ contains
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
+      type(origin_t) :: origin
 
       ! Repeat the check: now no other run can write to the folder.
       call check_overwrite(run, force, error)
       if (allocated(error)) return
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', run%scene_hash)
+      call run%provenance%set('walls', wall_names_text(run%simulation%named_walls))
       if (settings%scene%bodies_file /= '') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return
       run%provenance%processes = run%comm%size
       if (allocated(run%attempt%threads%reason)) call run%provenance%set('thread_choice', run%attempt%threads%reason)
       if (run%manifest%is_found .and. run%attempt%continues) &
-         call find_restart(run%folder, run%manifest, settings, run%scene_hash, run%attempt%may_change, run%earlier, &
-                           error)
+         call find_restart(run%folder, run%manifest, run%simulation, run%scene_hash, run%attempt%may_change, &
+                           run%earlier, error)
       if (allocated(error)) return
       call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), &
                         run%comm%size > 1_ip, run%lock, run%folder_note, run%manifest, error)
@@ -115,6 +119,11 @@ contains
       call write_header(run%log, run%provenance, run%folder)
       if (run%oversubscription /= '') call run%log%write_line(run%oversubscription)
       if (allocated(run%folder_note)) call run%log%write_line(run%folder_note)
+      if (settings%scene%name == 'result') then
+         call find_origin(settings, origin, error)
+         if (allocated(error)) return
+         call run%log%write_line(origin%note)
+      end if
       call describe(run%simulation, run%measures, run%log)
    end subroutine open_log
 

@@ -1,13 +1,13 @@
 !> Restart of an interrupted run: finds the newest valid checkpoint and restores the simulation from it.
 module polydem_restart
-   use polydem_changed_entries, only: changed_entries
+   use polydem_changed_entries, only: changed_entries, is_extension
    use polydem_checked_files, only: check_closed, find_segments, find_stranger, read_frames
    use polydem_checkpoint_fields, only: attempts_t, serialize_progress, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_domain, only: new_domain
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_system, only: exists
-   use polydem_kinds, only: dp, ip, lp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
    use polydem_monitor, only: monitor_t
@@ -51,12 +51,13 @@ module polydem_restart
 contains
 
    !> Choose the newest valid checkpoint, and check that settings and initial bodies are unchanged.
-   subroutine find_restart(folder, manifest, settings, scene, may_change, earlier, error)
+   subroutine find_restart(folder, manifest, simulation, scene, may_change, earlier, error)
       !> Result folder; this run holds its lock
       character(len=*), intent(in) :: folder
       !> Valid manifest of the folder
       type(manifest_t), intent(in) :: manifest
-      type(settings_t), intent(in) :: settings
+      !> The simulation at time 0, with the settings of this run
+      type(simulation_t), intent(in) :: simulation
       !> Hash of the initial bodies, as in the provenance of results
       character(len=*), intent(in) :: scene
       !> Whether the settings may differ from those of the checkpoint
@@ -66,28 +67,41 @@ contains
       !> Allocated if the run cannot restart
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: changes, former
+      logical :: is_longer
 
       call check_closed(manifest, folder, error)
       if (.not. allocated(error)) call choose_checkpoint(folder, manifest, earlier, error)
       if (allocated(error)) return
-      if (earlier%checkpoint == 0_ip) then
-         call restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
-         return
-      end if
-      changes = changed_entries(earlier%former_settings, settings%resolved)
-      former = origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene', error)
-      if (allocated(error)) return
-      if (changes /= '' .and. .not. may_change) then
-         call raise(error, input_error, 'the settings differ from those of the run in '//folder//': '//changes// &
-                    '. Restore them, or add --changed to resume with the new settings from step '// &
-                    to_text(earlier%step))
-      else if (former /= scene) then
-         call raise(error, input_error, folder//' holds the result of another run: '// &
-                    why_other(settings, changes)//'. Restore it, or use --force instead of --continue to start again')
-      end if
-      if (allocated(error)) return
-      if (changes /= '') earlier%remark = earlier%remark//new_line('a')//'changed    '//changes
-      call count_segments(folder, manifest, changes /= '', earlier, error)
+      associate (settings => simulation%settings)
+         if (earlier%checkpoint == 0_ip) then
+            call restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
+            return
+         end if
+         changes = changed_entries(earlier%former_settings, settings%resolved)
+         is_longer = is_extension(earlier%former_settings, settings%resolved)
+         former = origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene', error)
+         if (allocated(error)) return
+         if (changes /= '' .and. .not. (may_change .or. is_longer)) then
+            call raise(error, input_error, 'the settings differ from those of the run in '//folder//': '//changes// &
+                       '. Restore them, or add --changed to resume with the new settings from step '// &
+                       to_text(earlier%step))
+         else if (former /= scene) then
+            call raise(error, input_error, folder//' holds the result of another run: '// &
+                       why_other(settings, changes)//'. Restore it, or use --force instead of --continue to '// &
+                       'start again')
+         else if (earlier%step > simulation%n_steps) then
+            call raise(error, input_error, checkpoint_path(folder, earlier%checkpoint)//' is of step '// &
+                       to_text(earlier%step)//', behind the end of the run at step '//to_text(simulation%n_steps)// &
+                       ': increase duration in &integrate')
+         end if
+         if (allocated(error)) return
+         if (changes /= '') earlier%remark = earlier%remark//new_line('a')// &
+            trim(merge('extended  ', 'changed   ', is_longer))//repeat(' ', merge(3, 4, is_longer))//changes
+         if (is_longer .and. .not. settings%integrate%dt > 0.0_wp) earlier%remark = earlier%remark//new_line('a')// &
+            '           dt as before; a run that begins with integrate.dt = '//to_text(simulation%dt, 17)// &
+            ' has the same bits'
+      end associate
+      call count_segments(folder, manifest, changes /= '' .and. .not. is_longer, simulation%n_steps, earlier, error)
    end subroutine find_restart
 
    !> Why the initial bodies differ from those of the earlier run: by entries, or by the contents of a file
@@ -103,6 +117,9 @@ contains
          else if (scene%bodies_file /= '') then
             text = other_bodies//', though no entry does: the contents of bodies_file = '// &
                quoted(trim(scene%bodies_file))//' changed'
+         else if (scene%name == 'result') then
+            text = other_bodies//', though no entry does: the result in start_from = '// &
+               quoted(trim(scene%start_from))//' changed'
          else if (packing_of(settings) /= '') then
             text = other_bodies//', though no entry does: the contents of packing = '// &
                quoted(packing_of(settings))//' changed'
@@ -143,7 +160,7 @@ contains
       changes = changed_entries(former_settings, settings%resolved)
       if (changes == '' .and. former /= scene) changes = why_other(settings, changes)
       if (changes == '') then
-         call count_segments(folder, manifest, .false., earlier, error)
+         call count_segments(folder, manifest, .false., huge(1_lp), earlier, error)
       else
          call raise(error, input_error, folder//' has no checkpoint from which a run with other settings could '// &
                     'continue: '//changes//'. Choose another folder with --set output.folder=NAME, or use --force '// &
@@ -211,11 +228,14 @@ contains
       if (allocated(stranger)) call raise(error, io_error, path//' '//stranger)
    end subroutine read_progress
 
-   !> Find the last frame in closed segments. With changed settings, the run removes segments after the checkpoint.
-   subroutine count_segments(folder, manifest, is_changed, earlier, error)
+   !> Find the last frame in closed segments. With changed settings, the run removes segments after the checkpoint, and
+   !> always those after its end, which an attempt with a longer duration has left.
+   subroutine count_segments(folder, manifest, is_changed, last_step, earlier, error)
       character(len=*), intent(in) :: folder
       type(manifest_t), intent(in) :: manifest
       logical, intent(in) :: is_changed
+      !> Last step of the run
+      integer(lp), intent(in) :: last_step
       type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, problem
@@ -236,7 +256,7 @@ contains
          steps = earlier%unlisted(2:)
          if (earlier%segments <= size(places)) steps = manifest%entry(places(earlier%segments))%frames(2:)
          earlier%last_frame = steps(2)
-         if (.not. is_changed .or. earlier%last_frame <= earlier%step) return
+         if (earlier%last_frame <= merge(earlier%step, last_step, is_changed)) return
          if (steps(1) <= earlier%step) then
             call raise(error, input_error, path//' holds frames before and after step '//to_text(earlier%step)// &
                        ', at which the settings would change. Resume with the old settings until '// &
@@ -244,7 +264,7 @@ contains
          else
             earlier%surplus = earlier%surplus + 1_ip
             earlier%remark = earlier%remark//new_line('a')//'to remove  '//path// &
-               ', whose frames belong to the earlier settings'
+               ', whose frames belong to other settings'
          end if
          earlier%segments = earlier%segments - 1_ip
          earlier%last_frame = -1_lp
@@ -347,7 +367,7 @@ contains
          if (error%is_unread) return
          error%message = checkpoint_path(folder, earlier%checkpoint)//' does not fit this run: '//error%message
          if (index(error%message, '/run/time_step') > 0) error%message = error%message// &
-            '. Set dt in &integrate to the saved value; a dt that polydem chooses depends on the duration'
+            '. Set dt in &integrate to the saved value, or omit it'
          return
       end if
       ! The first step distributes the bodies again. The sums over all ranks continue on the root rank.

@@ -3,6 +3,7 @@ module polydem_run_output
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_balance_values, only: name_terms
    use polydem_counters, only: counters_t
+   use polydem_end_condition, only: condition_text, measure_condition, needs_for_stage => needs_contacts
    use polydem_energy_report, only: write_energy_report
    use polydem_errors, only: error_t, run_error
    use polydem_global_hash, only: hash_all_bodies
@@ -23,7 +24,7 @@ module polydem_run_output
    use polydem_wall_forces, only: complete_wall_forces
    implicit none
    private
-   public :: choose_intervals, count_frames, end_step, finish, frames_per_segment, needs_table
+   public :: choose_intervals, count_frames, end_step, finish, frames_per_segment, needs_table, write_stage
 
    !> Limits of the automatic number of frames per segment, and of its product with the number of bodies
    integer(lp), parameter :: least_frames = 20_lp, most_frames = 200_lp, most_poses = 200000_lp
@@ -46,6 +47,7 @@ contains
          line_due = is_line_due(run, s%step)
          call check_step(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
+         call measure_condition(s)
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then
             call count_contacts(s, n_contacts)
@@ -55,9 +57,14 @@ contains
             else
                call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, n_contacts)
             end if
+            if (s%stages%value >= 0.0_wp) call run%log%write_line('           '//condition_text(s))
          end if
          if (frame_due) call write_frame(run, error)
-         call run%log%show_progress(s%step, s%n_steps)
+         if (s%stages%number == 0_ip) then
+            call run%log%show_progress(s%step, s%n_steps)
+         else
+            call run%log%show_progress(s%step, s%n_steps, s%settings%stage(s%stages%number)%name)
+         end if
       end associate
    end subroutine end_step
 
@@ -67,6 +74,7 @@ contains
 
       associate (s => run%simulation)
          needs_table = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
+         needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
          needs_table = needs_table .or. needs_contacts(run%monitor, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
    end function needs_table
@@ -77,7 +85,38 @@ contains
       integer(lp), intent(in) :: step
 
       is_line_due = is_due(step, run%simulation%n_steps, run%log_steps)
+      associate (stages => run%simulation%stages)
+         if (stages%number == 0_ip .or. run%simulation%settings%output%log_interval > 0.0_wp) return
+         ! As many lines in each stage
+         is_line_due = is_due(step - stages%first(stages%number), stages%last - stages%first(stages%number), &
+                              max(1.0_dp, real(stages%last - stages%first(stages%number), dp)/default_lines))
+      end associate
    end function is_line_due
+
+   !> Write which stage begins or goes on, what changes in it, and what ends it.
+   subroutine write_stage(run)
+      !> The run at the start of a stage, or after a restart
+      type(run_t), intent(inout) :: run
+      character(len=:), allocatable :: text
+
+      associate (s => run%simulation, number => run%simulation%stages%number)
+         if (number == 0_ip) return
+         associate (stage => s%settings%stage(number), gravity => s%settings%forces%gravity)
+            text = 'stage      '//stage%name//', '//to_text(number)//' of '// &
+               to_text(size(s%settings%stage, kind=ip))//', from step '//to_text(s%stages%first(number))
+            if (stage%until == 'duration') text = text//' for '//to_text(stage%duration)//' s'
+            if (stage%until /= 'duration') text = text//' until '//trim(stage%until)//' is '// &
+               trim(merge('above', 'below', stage%above > 0.0_wp))//' '//to_text(max(stage%above, stage%below), 4)// &
+               ', at most '//to_text(stage%longest)//' s'
+            if (size(stage%gravity) == 2) text = text//', gravity '//to_text(gravity(1), 3)//', '// &
+               to_text(gravity(2), 3)//' m/s2'
+            if (abs(stage%friction_scale - 1.0_wp) > 0.0_wp) text = text//', friction times '// &
+               to_text(stage%friction_scale, 3)
+            if (stage%drag > 0.0_wp) text = text//', drag '//to_text(s%settings%forces%drag, 3)//' 1/s'
+         end associate
+      end associate
+      call run%log%write_line(text)
+   end subroutine write_stage
 
    !> Evaluate the energy and momentum balance of this step if output.energy_balance is on; collective.
    subroutine update_balance(run)

@@ -4,6 +4,7 @@ module polydem_run_simulation
    use polydem_checkpoint_fields, only: attempts_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: choose_communicator, communicator_t
+   use polydem_end_condition, only: decide_end, is_at_limit, pass_end
    use polydem_errors, only: error_t, raise, stopped_early
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
@@ -11,9 +12,10 @@ module polydem_run_simulation
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
-   use polydem_run_output, only: end_step, finish, needs_table
+   use polydem_run_output, only: end_step, finish, needs_table, write_stage
    use polydem_settings, only: settings_t
    use polydem_start, only: open_output
+   use polydem_start_from, only: return_to_state
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_decomposition, stage_output
@@ -60,7 +62,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
 
-      if (run%earlier%checkpoint == 0_ip) call end_step(run, error)
+      call write_stage(run)
+      if (run%earlier%checkpoint == 0_ip) then
+         call end_step(run, error)
+         if (.not. allocated(error)) call return_to_state(run%simulation, error)
+      end if
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error, needs_table(run))
          call synchronise_ranks(run, is_due, must_stop, error)
@@ -68,9 +74,12 @@ contains
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
          if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
+         if (.not. allocated(error)) call change_stage(run, error)
          if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
       end do
       call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
+      ! The result is complete without it.
+      if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) call write_checkpoint(run, error)
    end subroutine run_steps
 
    !> All-reduce the error of a step, and broadcast whether a checkpoint is due and whether the run must end, which the
@@ -97,33 +106,57 @@ contains
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 
-   !> Write a checkpoint if one is due, and end the run early if it must stop; collective.
+   !> Write a checkpoint if one is due, and end the run early if it must stop; collective. The last step has none, so
+   !> that a run that is killed before its report repeats this step.
    subroutine write_due_checkpoint(run, is_due, must_stop, error)
       type(run_t), intent(inout) :: run
       logical, intent(in) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      type(attempts_t) :: attempts
 
       associate (s => run%simulation)
          if (s%step == s%n_steps) return
-         if (is_due) then
-            call s%timers%start()
-            ! A checkpoint holds the number of warnings, not their text.
-            call report_pending_warnings(run%monitor, s, run%log)
-            ! The frames up to the checkpoint are on disk before the checkpoint is.
-            call run%trajectory%close(error, run%manifest)
-            if (allocated(error)) return
-            attempts = run%attempts
-            attempts%segments = int(run%trajectory%number, lp)
-            attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
-            call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, run%monitor, error)
-            call s%timers%add_to_total(stage_output)
-         end if
-         if (.not. must_stop) return
+         if (is_due) call write_checkpoint(run, error)
+         if (allocated(error) .or. .not. must_stop) return
          if (.not. allocated(run%reason)) run%reason = 'the root rank'
          call raise(error, stopped_early, 'interrupted by '//run%reason//' at step '//to_text(s%step)//' of '// &
                     to_text(s%n_steps)//'; add --continue to resume')
       end associate
    end subroutine write_due_checkpoint
+
+   !> Decide whether the present stage of the run ends, and begin the next one after its last step; collective. Before a
+   !> stage that has lasted too long stops the run, a checkpoint is written, so that it can go on with other settings.
+   subroutine change_stage(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: begins
+
+      if (run%simulation%stages%number == 0_ip) return
+      call decide_end(run%simulation)
+      if (is_at_limit(run%simulation)) call write_checkpoint(run, error)
+      if (allocated(error)) return
+      call pass_end(run%simulation, begins, error)
+      if (begins) call write_stage(run)
+   end subroutine change_stage
+
+   !> Write a checkpoint; collective.
+   subroutine write_checkpoint(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      type(attempts_t) :: attempts
+
+      associate (s => run%simulation)
+         call s%timers%start()
+         ! A checkpoint holds the number of warnings, not their text.
+         call report_pending_warnings(run%monitor, s, run%log)
+         ! The frames up to the checkpoint are on disk before the checkpoint is.
+         call run%trajectory%close(error, run%manifest)
+         if (allocated(error)) return
+         attempts = run%attempts
+         attempts%segments = int(run%trajectory%number, lp)
+         attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
+         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, run%monitor, error)
+         call s%timers%add_to_total(stage_output)
+      end associate
+   end subroutine write_checkpoint
 
 end module polydem_run_simulation

@@ -10,6 +10,7 @@ module polydem_scene_measures
    use polydem_motion_check, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
+   use polydem_run_duration, only: longest_run
    use polydem_simulation, only: simulation_t
    use polydem_stability_check, only: find_stable_step
    use polydem_strings, only: to_text
@@ -99,7 +100,7 @@ contains
          call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%walls)
             measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls(k), s%bodies%radius, &
-                                                                               s%settings%integrate%duration))
+                                                                               longest_run(s%settings)))
          end do
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then

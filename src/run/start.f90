@@ -3,21 +3,24 @@ module polydem_start
    use omp_lib, only: omp_get_thread_limit, omp_set_num_threads
    use polydem_broadcaster, only: broadcaster_t
    use polydem_communicator, only: choose_communicator, communicator_t
+   use polydem_end_condition, only: pass_end
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
+   use polydem_former_step, only: find_former_step
    use polydem_global_hash, only: hash_scene
    use polydem_hash, only: hexadecimal
-   use polydem_kinds, only: dp, ip
+   use polydem_kinds, only: dp, ip, wp
    use polydem_restart, only: restore, serialize_earlier
    use polydem_process_limits, only: check_threads
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_run, only: run_t
    use polydem_run_output, only: frames_per_segment
-   use polydem_scene, only: build_scene
+   use polydem_scene, only: assign_motions, build_scene
    use polydem_scene_measures, only: measure_scene
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_start_simulation, only: start_with_bodies
+   use polydem_start_from, only: read_start, recall_history
+   use polydem_start_simulation, only: place_bodies, start_forces
    use polydem_strings, only: to_text
    use polydem_thread_choice, only: choose_threads, thread_choice_t
    implicit none
@@ -27,7 +30,7 @@ module polydem_start
 contains
 
    !> Build the scene and the simulation that the settings define. Collective; all ranks get the same error.
-   subroutine new_simulation(settings, self, error, comm, threads)
+   subroutine new_simulation(settings, self, error, comm, threads, former_step)
       type(settings_t), intent(in) :: settings
       !> The simulation, ready to advance
       type(simulation_t), intent(out) :: self
@@ -37,16 +40,26 @@ contains
       class(communicator_t), intent(in), optional :: comm
       !> How the number of threads is determined; default: it is set already
       type(thread_choice_t), intent(inout), optional :: threads
+      !> Time step of an earlier attempt, which the simulation keeps unless the settings have one [s]; 0: there is none
+      real(wp), intent(in), optional :: former_step
       class(communicator_t), allocatable :: ranks
 
       call choose_communicator(ranks, comm)
+      if (present(former_step)) self%dt = former_step
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
-      call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size)
+      if (settings%scene%name == 'result') then
+         call read_start(settings, ranks, self%bodies, self%named_walls, error)
+         if (.not. allocated(error)) call assign_motions(settings, self%bodies, self%named_walls, self%walls, error)
+      else
+         call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size, self%named_walls)
+      end if
       call ranks%all_reduce_error(error)
       if (present(threads) .and. .not. allocated(error)) &
          call set_threads(threads, ranks, size(self%bodies%free, kind=ip), error)
-      if (.not. allocated(error)) call start_with_bodies(settings, ranks, self, error)
+      if (.not. allocated(error)) call place_bodies(settings, ranks, self, error)
+      if (settings%scene%name == 'result' .and. .not. allocated(error)) call recall_history(self, error)
+      if (.not. allocated(error)) call start_forces(self, error)
    end subroutine new_simulation
 
    !> Set the number of OpenMP threads if it is still open. Collective; all ranks get the same error.
@@ -78,8 +91,11 @@ contains
       !> Allocated for bad input
       type(error_t), allocatable, intent(inout) :: error
 
+      real(wp) :: former_step
+
       if (allocated(run%scene_hash)) return
-      call new_simulation(settings, run%simulation, error, run%comm, run%attempt%threads)
+      call find_former_step(run, former_step)
+      call new_simulation(settings, run%simulation, error, run%comm, run%attempt%threads, former_step)
       if (allocated(error)) return
       call measure_scene(run%simulation, run%measures)
       call hash_scene(run%comm, run%simulation%bodies, run%attempts%scene)
@@ -94,6 +110,7 @@ contains
       !> Allocated if the checkpoint cannot be restored
       type(error_t), allocatable, intent(inout) :: error
       type(broadcaster_t) :: broadcaster
+      logical :: begins
 
       allocate (broadcaster%comm, source=run%comm)
       broadcaster%is_reading = .not. run%comm%is_root()
@@ -106,6 +123,8 @@ contains
                               to_text(run%earlier%step))
       call restore(run%folder, run%earlier, run%provenance%text_of('revision'), run%simulation, run%attempts, &
                    run%monitor, run%log, error)
+      if (allocated(error)) return
+      call pass_end(run%simulation, begins, error)
       run%checkpoints%last_step = run%earlier%step
       run%checkpoints%next = modulo(run%earlier%checkpoint, n_checkpoints) + 1_ip
    end subroutine recall

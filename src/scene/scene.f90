@@ -19,7 +19,7 @@ module polydem_scene
    use polydem_outlines, only: pi
    use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: parts_t
-   use polydem_place_parts, only: list_parts, wall_bodies_t
+   use polydem_place_parts, only: list_parts
    use polydem_polygon_list, only: polygon_list_t
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_prescribed_motion, only: motion_t
@@ -27,10 +27,11 @@ module polydem_scene
    use polydem_stack, only: make_stack
    use polydem_strings, only: to_text
    use polydem_wall, only: new_wall, wall_t
+   use polydem_wall_bodies, only: wall_bodies_t
    use polydem_wall_outlines, only: is_anticlockwise
    implicit none
    private
-   public :: build_scene, find_parts
+   public :: build_scene, find_parts, assign_motions
 
    !> Entries that determine shapes and masses of generated bodies, for a message
    character(len=*), parameter :: sizes = 'short_axis, long_axis_max, solid_fraction, radius, width, height and density'
@@ -41,7 +42,7 @@ module polydem_scene
 contains
 
    !> Make the bodies of a scene and its moving walls.
-   subroutine build_scene(settings, bodies, walls, error, rank, n_ranks)
+   subroutine build_scene(settings, bodies, walls, error, rank, n_ranks, named)
       !> Settings: groups &scene, &motion and &forces (gravity and stiffness, for blocks at rest)
       type(settings_t), intent(in) :: settings
       !> Bodies at the start; free bodies come first unless a bodies file has another order
@@ -53,6 +54,8 @@ contains
       !> Number of this rank, from 0, and number of ranks; each rank makes all fixed bodies and its share of the free
       !> bodies. Default: one rank
       integer(ip), intent(in), optional :: rank, n_ranks
+      !> Walls with names
+      type(wall_bodies_t), allocatable, intent(out), optional :: named(:)
       type(body_list_t) :: list
       type(parts_t) :: parts
       type(wall_bodies_t), allocatable :: walls_of_parts(:)
@@ -73,6 +76,7 @@ contains
             overrides_of(settings, 'grains')//overrides_of(settings, 'wall')
       end if
       if (.not. allocated(error)) call assign_motions(settings, bodies, walls_of_parts, walls, error)
+      if (present(named)) call move_alloc(walls_of_parts, named)
    end subroutine build_scene
 
    !> Beginning of a message about one of all bodies
@@ -225,8 +229,9 @@ contains
    subroutine assign_motions(settings, bodies, named, walls, error)
       type(settings_t), intent(in) :: settings
       type(bodies_t), intent(in) :: bodies
-      !> Walls of the parts, which motions may name
+      !> Walls with names, which motions may refer to
       type(wall_bodies_t), intent(in) :: named(:)
+      !> The moving walls
       type(wall_t), allocatable, intent(out) :: walls(:)
       type(error_t), allocatable, intent(inout) :: error
       ! Slots of the fixed bodies; the wall of each one, 0 if it is at rest; the first body of each wall
@@ -247,6 +252,8 @@ contains
             end if
          end associate
          motions(k) = prescribed(settings%motion(k))
+         motions(k)%stage = number_of_stage(settings, settings%motion(k)%stage)
+         if (motions(k)%stage > 0_ip) motions(k)%start = huge(1.0_wp)
       end do
       allocate (wall_of(size(slots)), first(size(slots)))
       wall_of = 0_ip
@@ -266,6 +273,18 @@ contains
          call new_wall(walls(w), pack(motions, moves(:, first(w))), bodies, pack(slots, wall_of == w))
       end do
    end subroutine assign_motions
+
+   !> Number of the stage with a name; 0 without a name
+   pure integer(ip) function number_of_stage(settings, name) result(number)
+      type(settings_t), intent(in) :: settings
+      character(len=*), intent(in) :: name
+      integer(ip) :: k
+
+      number = 0_ip
+      do k = 1_ip, size(settings%stage, kind=ip)
+         if (name /= '' .and. settings%stage(k)%name == name) number = k
+      end do
+   end function number_of_stage
 
    !> Parameters of a motion; revolutions per second and hertz become radians per second
    pure type(motion_t) function prescribed(motion)

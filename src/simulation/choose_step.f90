@@ -1,10 +1,12 @@
 !> Choice of the time step, and the number of steps.
 module polydem_choose_step
+   use polydem_begin_stage, only: find_last_steps
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_parameters, only: pair_parameters
+   use polydem_run_duration, only: longest_run
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
@@ -21,7 +23,8 @@ module polydem_choose_step
 
 contains
 
-   !> Use dt of the settings, or compute it: a fraction of the stable time step, reduced to divide the duration evenly.
+   !> Use dt of the settings, or that of the simulation if it has one, or compute it: a fraction of the stable time
+   !> step, reduced to divide the duration evenly, or to three digits if the run has stages.
    !> Collective; all ranks get the same error.
    subroutine choose_step(self, error)
       !> The simulation with settings, ranks, bodies and integrator; `dt`, `n_steps` and `expected_stable_step` are set
@@ -53,34 +56,60 @@ contains
       self%expected%depth = found(1)
       self%expected%length = found(2)
       self%expected%damped = found(3)
-      associate (settings => self%settings%integrate)
-         self%dt = settings%dt
+      associate (settings => self%settings%integrate, duration => longest_run(self%settings))
+         if (settings%dt > 0.0_wp) self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then
             call raise(error, input_error, place_of(self%settings, 'integrate', 'dt')//': cannot choose dt: there '// &
                        'is no free body, or stiffness or mass is extreme. Set dt in &integrate')
             return
          end if
          if (self%dt <= 0.0_wp) then
-            steps = settings%duration/(settings%safety_factor*self%expected_stable_step)
+            steps = duration/(settings%safety_factor*self%expected_stable_step)
             self%dt = settings%safety_factor*self%expected_stable_step
-            if (steps < most_steps) self%dt = settings%duration/real(max(1_lp, ceiling(steps, lp)), wp)
+            if (self%stages%number > 0_ip) then
+               self%dt = short_number(self%dt)
+            else if (steps < most_steps) then
+               self%dt = duration/real(max(1_lp, ceiling(steps, lp)), wp)
+            end if
          end if
-         steps = settings%duration/self%dt
+         steps = duration/self%dt
          if (.not. (steps >= 0.5_wp .and. steps < most_steps)) then
             call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
-                       to_text(settings%duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
+                       to_text(duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
                        to_text(steps)//' steps, but only 1 to '//to_text(most_steps)// &
                        ' are allowed. Change duration, dt, safety_factor or speed in &integrate'// &
                        overrides_of(self%settings, 'integrate'))
             return
          end if
          self%n_steps = nint(steps, lp)
-         if (self%dt*self%body_forces%rate() > greatest_change) call raise(error, input_error, &
-            place_of(self%settings, 'forces', 'drag')//': with dt = '//to_text(self%dt)//' s a rate of '// &
-            to_text(self%body_forces%rate())//' 1/s changes a velocity by more than a tenth in a step. Set dt in '// &
-            '&integrate to at most '//to_text(greatest_change/self%body_forces%rate(), 2)// &
-            ', or decrease drag in &forces')
+         if (self%stages%number > 0_ip) call find_last_steps(self)
       end associate
+      call check_rate(self, error)
    end subroutine choose_step
+
+   !> Check that no force that is no contact changes velocities by much in a step.
+   subroutine check_rate(self, error)
+      type(simulation_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (self%dt*self%body_forces%rate() > greatest_change) call raise(error, input_error, &
+         place_of(self%settings, 'forces', 'drag')//': with dt = '//to_text(self%dt)//' s a rate of '// &
+         to_text(self%body_forces%rate())//' 1/s changes a velocity by more than a tenth in a step. Set dt in '// &
+         '&integrate to at most '//to_text(greatest_change/self%body_forces%rate(), 2)// &
+         ', or decrease drag in &forces')
+   end subroutine check_rate
+
+   !> A number with three digits that does not exceed another one
+   pure real(wp) function short_number(number)
+      real(wp), intent(in) :: number
+      character(len=16) :: text
+      integer :: k
+
+      do k = 0, 1
+         write (text, '(es16.2e4)') number*(1.0_wp - 0.005_wp*real(k, wp))
+         read (text, *) short_number
+         if (short_number <= number) return
+      end do
+   end function short_number
 
 end module polydem_choose_step

@@ -8,6 +8,7 @@ module polydem_expected_speed
    use polydem_elementary, only: hypotenuse
    use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
    use polydem_kinds, only: ip, wp
+   use polydem_run_duration, only: longest_run
    use polydem_simulation, only: simulation_t
    use polydem_wall, only: greatest_wall_speed
    implicit none
@@ -21,7 +22,7 @@ contains
    subroutine find_expected_speed(self)
       !> The simulation with settings, ranks, bodies and walls; `expected` is set
       type(simulation_t), intent(inout) :: self
-      real(wp) :: start, fall, wall
+      real(wp) :: start, fall, in_stage, wall
       integer :: k
 
       associate (expected => self%expected)
@@ -29,10 +30,18 @@ contains
          expected%origin = 'speed in &integrate'
          if (expected%speed > 0.0_wp) return
          call find_start_speed(self, start)
-         call find_fall_speed(self, fall)
+         call find_fall_speed(self, self%settings%forces%gravity, fall)
+         do k = 1, size(self%settings%stage)
+            if (size(self%settings%stage(k)%gravity) == 2) then
+               call find_fall_speed(self, self%settings%stage(k)%gravity, in_stage)
+            else
+               call find_fall_speed(self, self%stages%gravity, in_stage)
+            end if
+            fall = max(fall, in_stage)
+         end do
          wall = 0.0_wp
          do k = 1, size(self%walls)
-            wall = max(wall, greatest_wall_speed(self%walls(k), self%bodies%radius, self%settings%integrate%duration))
+            wall = max(wall, greatest_wall_speed(self%walls(k), self%bodies%radius, longest_run(self%settings)))
          end do
          expected%speed = max(start, fall, wall)
          expected%origin = 'the velocities at the start'
@@ -64,14 +73,16 @@ contains
    end subroutine find_start_speed
 
    !> Find the speed after a fall of the highest free body to the lowest point of the scene [m/s].
-   subroutine find_fall_speed(self, speed)
+   subroutine find_fall_speed(self, gravity, speed)
       type(simulation_t), intent(inout) :: self
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
       real(wp), intent(out) :: speed
       real(wp) :: strength, up(2), highest(1), lowest(1), height
       integer(ip) :: s, v
 
       speed = 0.0_wp
-      associate (bodies => self%bodies, gravity => self%settings%forces%gravity)
+      associate (bodies => self%bodies)
          strength = hypotenuse(gravity(1), gravity(2))
          if (.not. strength > 0.0_wp) return
          up = -gravity/strength

@@ -34,6 +34,7 @@ contains
 
       call find_folds(self%bodies)
       call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
+      if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
       self%walk%walls%energy_is_known = self%law%energy_is_known

@@ -17,9 +17,11 @@ module polydem_simulation
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
    use polydem_packed_history, only: packed_history_t
+   use polydem_run_stages, only: run_stages_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
    use polydem_wall, only: wall_t
+   use polydem_wall_bodies, only: wall_bodies_t
    use polydem_walk_results, only: walk_results_t
    implicit none
    private
@@ -59,8 +61,10 @@ module polydem_simulation
 
    !> The complete state of a simulation on one rank
    type :: simulation_t
-      !> Settings of the run
+      !> Settings of the run; gravity and drag of the group &forces are those of the present stage
       type(settings_t) :: settings
+      !> Stages of the run
+      type(run_stages_t) :: stages
       !> Communicator of the ranks that share the bodies
       class(communicator_t), allocatable :: comm
       !> Part of space of this rank, and its halo
@@ -69,6 +73,8 @@ module polydem_simulation
       type(bodies_t) :: bodies
       !> Fixed bodies with prescribed motions; other fixed bodies are at rest
       type(wall_t), allocatable :: walls(:)
+      !> Walls with names; not allocated if nobody has named them
+      type(wall_bodies_t), allocatable :: named_walls(:)
       !> Maker of the bounding boxes
       type(box_maker_t) :: maker
       !> Bounding boxes

@@ -1,5 +1,6 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
+   use polydem_begin_stage, only: continue_stages, prepare_stages
    use polydem_bodies, only: bodies_t
    use polydem_body_forces, only: choose_body_forces
    use polydem_box_maker, only: update_boxes
@@ -19,13 +20,13 @@ module polydem_start_simulation
    use polydem_prediction, only: move_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: forces_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
    implicit none
    private
-   public :: start_with_bodies
+   public :: start_with_bodies, place_bodies, start_forces
 
 contains
 
@@ -35,7 +36,21 @@ contains
       !> Checked settings; the group &scene is not used
       type(settings_t), intent(in) :: settings
       class(communicator_t), intent(in) :: comm
-      !> On entry with bodies and walls, on return ready to advance
+      !> On entry with bodies and walls, and with a time step if it is not to be chosen; on return ready to advance
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if bodies or settings are invalid
+      type(error_t), allocatable, intent(inout) :: error
+
+      call place_bodies(settings, comm, self, error)
+      if (.not. allocated(error)) call start_forces(self, error)
+   end subroutine start_with_bodies
+
+   !> The first part of `start_with_bodies`: all but the forces. Collective; all ranks get the same error.
+   subroutine place_bodies(settings, comm, self, error)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      class(communicator_t), intent(in) :: comm
+      !> On entry with bodies and walls
       type(simulation_t), intent(inout) :: self
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
@@ -48,10 +63,12 @@ contains
       self%settings = settings
       call enter_cell(self, error)
       if (allocated(error)) return
+      call prepare_stages(self)
       call new_integrator(settings%integrate, self%integrator)
-      call choose_body_forces(settings%forces, self%body_forces)
+      call choose_all_fields(self)
       call choose_step(self, error)
       if (allocated(error)) return
+      call self%body_forces%configure(self%settings%forces)
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
       call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, self%bodies%cell)
       if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
@@ -61,17 +78,42 @@ contains
       call self%integrator%start(self%bodies)
       if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
+      call continue_stages(self, error)
       call move_walls(self, 0.0_wp)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
       call redistribute(self, .false., error)
-      if (.not. allocated(error)) call compute_forces(self, error)
+      call self%comm%all_reduce_error(error)
+   end subroutine place_bodies
+
+   !> The second part of `start_with_bodies`. If contact history was received, the forces follow from it. Collective;
+   !> all ranks get the same error.
+   subroutine start_forces(self, error)
+      !> The simulation after `place_bodies`
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if a contact stops the run
+      type(error_t), allocatable, intent(inout) :: error
+
+      call compute_forces(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call start_integration(self)
-      if (settings%output%energy_balance) call start_energy_balance( &
-         self%energy_balance, self%comm, settings%forces%gravity, self%bodies, self%force_sums, self%walk%walls)
+      if (self%settings%output%energy_balance) call start_energy_balance( &
+         self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%force_sums, self%walk%walls)
       self%timers = timers_t()
-   end subroutine start_with_bodies
+   end subroutine start_forces
+
+   !> Choose the forces that are no contacts: those of any stage, with the parameters of the strongest.
+   subroutine choose_all_fields(self)
+      type(simulation_t), intent(inout) :: self
+      type(forces_settings_t) :: forces
+      integer :: k
+
+      forces = self%settings%forces
+      do k = 1, size(self%settings%stage)
+         forces%drag = max(forces%drag, self%stages%drag + self%settings%stage(k)%drag)
+      end do
+      call choose_body_forces(forces, self%body_forces)
+   end subroutine choose_all_fields
 
    !> Set the accelerations at time 0: from all forces, or from all but those of contacts, depending on the scheme.
    subroutine start_integration(self)

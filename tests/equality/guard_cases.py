@@ -103,6 +103,10 @@ VARIED = {
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6", "wall.one.corners": "6",
+    "motion.one.stage": None, "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
+    "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
+    "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
+    "stage.one.gravity": "1, -20", "stage.one.friction_scale": "0.5", "stage.one.drag": "2",
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
     "forces.restitution": "0.3",
@@ -140,12 +144,15 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
               "contact_pair.one.materials": VARIED["contact_pair.one.materials"]}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
+             **dict.fromkeys(("motion.one.stage", "scene.start_from", "stage.one.wall", "stage.one.opposite"),
+                             "check_stages.py"),
              "wall.one.bodies": "as motion.one.bodies", "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
-UNTRIED = {("wall.one.outline", "bodies"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
+UNTRIED = {("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
+           ("stage.one.until", "strain"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
 
 #: Numbers of ranks of the program with MPI
 RANKS = (1, 2, 3)
@@ -212,7 +219,7 @@ def choices(entries, name):
 
 def generated(name, settings, **others):
     """A case without a namelist file, with frames."""
-    interval = float(settings["integrate.duration"]) / N_FRAMES
+    interval = float(settings.get("integrate.duration", "0.02")) / N_FRAMES
     order = {name: value for name, ((key, word), value) in SECOND_ORDER.items() if settings.get(key, word) == word}
     settings = {**OUTPUT, "output.frame_interval": f"{interval:.6g}", **order, **settings}
     # How work that was timed is shared differs from run to run, and with it the counters of ranks.
@@ -242,7 +249,8 @@ def entry_cases(entries):
         if entry.name.startswith("bench."):
             continue
         condition, words = entry.condition or ("", ())
-        scene = words[next(turn) % len(words)] if condition == "scene.name" else "drum"
+        known = [word for word in words if word in SCENES] or ["drum"]
+        scene = known[next(turn) % len(known)] if condition == "scene.name" else "drum"
         scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall", "cell.")) else scene
         base = dict(SCENES[scene])
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
@@ -250,6 +258,9 @@ def entry_cases(entries):
             base = {key: value for key, value in base.items() if fits(key, base, entries)}
         if entry.name == "scene.motion" or entry.name.startswith("motion."):
             base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
+        if entry.name.startswith("stage."):
+            del base["integrate.duration"]
+            base.setdefault(f"stage.{NAME}.until", "duration")
         if entry.name.startswith("motion."):
             base.setdefault(f"motion.{NAME}.kind", "rotation")
         for value in values_of(entry, "at" if base.get(f"grains.{NAME}.region") == "at" else scene):
@@ -259,6 +270,8 @@ def entry_cases(entries):
             if entry.name == "scene.name":
                 settings = dict(SCENES[value])
             settings.update(companions(settings, entry.name, entries))
+            if settings.get(f"stage.{NAME}.until", "duration") != "duration" and entry.name != f"stage.{NAME}.above":
+                settings.setdefault(f"stage.{NAME}.below", VARIED[f"stage.{NAME}.below"])
             if entry.name == "scene.boxes":
                 settings.pop("scene.bodies")
             name = f"entries/{entry.name}={value.replace(', ', ',')}" + f"@{scene}" * (scene != "drum")
@@ -292,7 +305,7 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED[entry.name] for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith(("scene.motion_", "motion.", *PARTS)) and entry.condition
+            and entry.name.startswith(("scene.motion_", "motion.", "stage.", *PARTS)) and entry.condition
             and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
 

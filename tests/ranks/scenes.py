@@ -82,6 +82,21 @@ SCENES = {
 &forces gravity = 40, -60 stiffness = 2e6 /
 &integrate accumulation = 'compensated' duration = 0.02 /
 """,
+    # Stages that conditions end, with changes of gravity, friction and drag; a lid moves in one of them.
+    "stages": """\
+&wall name = 'floor' outline = 'rectangle' low = -0.1, -0.02 high = 0.1, 0 /
+&wall name = 'left' outline = 'rectangle' low = -0.07, 0 high = -0.05, 0.3 /
+&wall name = 'right' outline = 'rectangle' low = 0.05, 0 high = 0.07, 0.3 /
+&wall name = 'lid' outline = 'rectangle' low = -0.049, 0.1 high = 0.049, 0.11 /
+&grains name = 'sand' region = 'box' low = -0.05, 0 high = 0.05, 0.1 number = 75 arrangement = 'spread' speed = 0.5 /
+&forces stiffness = 2e5 friction_coefficient = 0.5 /
+&motion name = 'down' wall = 'lid' kind = 'translation' velocity = 0, -2 ramp = 2e-3 stage = 'press' /
+&stage name = 'fall' until = 'kinetic' above = 4e-2 hold = 5e-4 longest = 1 check = 5 gravity = 0, -90
+   friction_scale = 0 /
+&stage name = 'press' until = 'strain' wall = 'lid' opposite = 'floor' above = 0.05 longest = 1 check = 7 drag = 3 /
+&stage name = 'rest' until = 'unbalanced' below = 4 longest = 1 gravity = 20, -20 /
+&stage name = 'float' gravity = 0, 0 duration = 0.004 /
+""",
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /

@@ -20,12 +20,12 @@ FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
                     re.MULTILINE).group(1).split(", ")
 #: How often bodies are handed out anew at least; grains in a stack hardly move
 LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "materials": 100, "cell": 100,
-                     "chute": 100, "stack": 1}
+                     "chute": 100, "stages": 30, "stack": 1}
 #: What is tried unless all is: every scene on several numbers of ranks, every finder and number of threads somewhere
 QUICK = [(scene, ranks, 1 + (ranks + k) % 2, FINDERS[(3 * k + n) % len(FINDERS)])
          for k, scene in enumerate(SCENES)
          for n, ranks in enumerate(((2, 4, 3), (1, 3, 7), (2, 3, 4), (1, 4, 2), (1, 2, 7), (1, 3, 4), (1, 3, 7),
-                                    (2, 3, 7), (2, 3, 7))[k])]
+                                    (2, 3, 7), (1, 2, 3), (2, 3, 7))[k])]
 
 
 def pytest_generate_tests(metafunc):

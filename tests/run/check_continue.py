@@ -231,6 +231,51 @@ def a_finished_run_stays_as_it_is(case):
     assert code == BAD_INPUT and "add --continue to resume it" in message, (code, message)
 
 
+def a_finished_run_is_made_longer(case):
+    # Step 900 has a frame in the whole run, too.
+    short = ("--set", "integrate.duration=9e-3")
+    code, _, message = case.run("longer", *short)
+    assert code == 0, message
+    before = closed_segments("longer")
+    for words, options in (("integrate.duration was 0.009 and is 0.006", ()), ("behind the end", ("--changed",))):
+        code, _, message = case.run("longer", "--continue", "--set", "integrate.duration=6e-3", *options)
+        assert code == BAD_INPUT and words in message and closed_segments("longer") == before, (code, message)
+    # A kill while the run grows: it grows on, or ends as it was.
+    for _ in range(MOST_ATTEMPTS):
+        shutil.copytree("longer", "regrown")
+        process = start(case.program, "regrown", "--continue", "--set", "checkpoint.steps=0")
+        wait_for(lambda: len(closed_segments("regrown")) > len(before) or process.poll() is not None)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        if process.returncode != 0:
+            break
+        shutil.rmtree("regrown")
+    assert len(closed_segments("regrown")) > len(before)
+    shutil.copytree("regrown", "shrunk")
+    code, output, message = case.run("shrunk", "--continue", *short)
+    assert code == 0 and "to remove" in output and closed_segments("shrunk") == before, (output, message)
+    for folder in "longer", "shrunk", "regrown":
+        output = case.finish(folder)
+        assert "extended   integrate.duration was 0.009 and is 0.012" in output, output
+        after = closed_segments(folder)
+        assert all(after[name] == content for name, content in before.items())
+        checked = subprocess.run([case.program, "info", "--check", folder], capture_output=True, text=True, check=False)
+        assert checked.returncode == 0, checked.stdout
+    # A step that is chosen stays, and the log says which one it is.
+    chosen = ("--set", "integrate.dt=0", "--set", "integrate.safety_factor=0.1")
+    for duration, options in (("2e-3", ()), ("3.1e-3", ("--continue",))):
+        code, grown, message = case.run("chosen", *chosen, "--set", f"integrate.duration={duration}", *options)
+        assert code == 0, message
+    step = re.search(r"a run that begins with integrate.dt = (\S+) has the same bits", grown).group(1)
+    code, whole, message = case.run("given", "--set", f"integrate.dt={step}", "--set", "integrate.duration=3.1e-3")
+    assert code == 0 and totals_of(whole) == totals_of(grown), message
+    # Without the last checkpoint there is nothing to go on from.
+    none = ("--set", "checkpoint.at_end=.false.", "--set", "checkpoint.steps=0")
+    assert case.run("ended", *short, *none)[0] == 0 and not checkpoints_of("ended")
+    code, _, message = case.run("ended", "--continue")
+    assert code == BAD_INPUT and "has no checkpoint from which" in message, (code, message)
+
+
 def a_run_without_checkpoint_begins_with_its_first_step(case):
     assert "no checkpoint" not in case.finish("fresh")
     case.interrupt("early", signal.SIGKILL, "--set", "checkpoint.steps=0", "--set", "output.frames_per_segment=1000",
@@ -312,6 +357,7 @@ def a_folder_that_cannot_be_written_is_named(case):
 TESTS = (a_signal_ends_a_run_with_a_checkpoint, usr1_while_a_run_starts_ends_it_after_the_first_step,
          a_second_signal_ends_it_at_once, elapsed_time_ends_a_run_in_time, a_damaged_checkpoint_is_passed_over,
          changed_settings_are_refused_unless_allowed, a_finished_run_stays_as_it_is,
+         a_finished_run_is_made_longer,
          a_run_without_checkpoint_begins_with_its_first_step,
          a_missing_segment_is_noticed, a_run_that_a_guard_stops_leaves_frames_and_checkpoint,
          a_disk_that_is_full_loses_nothing, a_folder_that_cannot_be_written_is_named)

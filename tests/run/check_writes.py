@@ -35,7 +35,7 @@ from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Frames with contacts in several segments, and a checkpoint after each step but the last
+#: Frames with contacts in several segments, and a checkpoint after each step
 SCENE = """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /
 &forces stiffness = 1e5 midstep_slip = .true. tilt_damping = 0.5 /

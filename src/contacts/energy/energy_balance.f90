@@ -52,9 +52,9 @@ module polydem_energy_balance
       !> Sums over steps of the wall channels of each body, (n_wall_channels, slot)
       real(wp), allocatable :: wall_sum(:, :)
       !> Number of accumulated steps
-      integer(lp), private :: steps = 0_lp
+      integer(lp) :: steps = 0_lp
       !> Energy, momentum along x and y, and angular momentum at the start
-      real(wp), private :: start(4) = 0.0_wp
+      real(wp) :: start(4) = 0.0_wp
       !> Elastic energy of the contacts at the start, if they have one [J/m]
       real(wp), private :: elastic_start = 0.0_wp
    end type energy_balance_t

@@ -23,6 +23,7 @@ module polydem_body_forces
       type(listed_force_t), allocatable :: list(:)
    contains
       procedure :: apply
+      procedure :: configure
       procedure :: rate
       procedure :: description
       procedure :: add
@@ -91,6 +92,18 @@ contains
       end do
       call add_field(slots, force(:, :size(slots)), sums)
    end subroutine apply_block
+
+   !> Copy the parameters of all forces from the settings. The forces stay the same.
+   subroutine configure(self, settings)
+      class(body_forces_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+      integer :: k
+
+      if (.not. allocated(self%list)) return
+      do k = 1, size(self%list)
+         call self%list(k)%force%configure(settings)
+      end do
+   end subroutine configure
 
    !> Greatest rate at which a force changes velocities [1/s]
    pure real(wp) function rate(self)

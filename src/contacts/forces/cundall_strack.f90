@@ -28,6 +28,8 @@ module polydem_cundall_strack
    type, extends(force_part_t) :: cundall_strack_t
       !> Friction coefficient mu
       type(pair_value_t) :: coefficient
+      !> Its common factor in the settings
+      real(wp) :: full_coefficient = 0.0_wp
       !> Stiffness of the spring k_t [N/m2], and the square roots of its factors
       type(pair_value_t) :: stiffness, root_factor
       !> Dashpot as a share d of sqrt(k_t m_t)
@@ -36,6 +38,7 @@ module polydem_cundall_strack
       logical :: midstep = .false.
    contains
       procedure :: configure
+      procedure :: scale_friction
       procedure :: add
       procedure :: stiffen
    end type cundall_strack_t
@@ -50,6 +53,7 @@ contains
 
       self%stage = stage_last
       self%coefficient = pairs%friction_coefficient
+      self%full_coefficient = self%coefficient%one
       self%stiffness = pairs%tangential_stiffness
       self%root_factor = self%stiffness
       if (allocated(self%stiffness%factor)) self%root_factor%factor = sqrt(self%stiffness%factor)
@@ -58,6 +62,14 @@ contains
       self%needs_accelerations = self%midstep
       self%history_kinds = [history_kind_t('tangential', 'N/m', 'force of the tangential spring')]
    end subroutine configure
+
+   !> Scale the friction coefficient.
+   subroutine scale_friction(self, factor)
+      class(cundall_strack_t), intent(inout) :: self
+      real(wp), intent(in) :: factor
+
+      self%coefficient%one = factor*self%full_coefficient
+   end subroutine scale_friction
 
    !> Add the tangential force and store the spring force.
    subroutine add(self, bodies, dt, block, history)

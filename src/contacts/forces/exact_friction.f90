@@ -50,6 +50,8 @@ module polydem_exact_friction
    type, extends(velocity_constraint_t) :: exact_friction_t
       !> Friction coefficient mu
       type(pair_value_t) :: coefficient
+      !> Its common factor in the settings
+      real(wp) :: full_coefficient = 0.0_wp
       !> Accepted remaining slip, as a share of the greatest slip velocity that friction removes in a step
       real(wp) :: tolerance = 0.0_wp
       !> Network of the contacts of the last step
@@ -62,6 +64,7 @@ module polydem_exact_friction
       real(wp), private :: greatest_residual = 0.0_wp
    contains
       procedure :: configure
+      procedure :: scale_friction
       procedure :: check
       procedure :: apply
       procedure :: report
@@ -79,9 +82,18 @@ contains
       type(pair_parameters_t), intent(in) :: pairs
 
       self%coefficient = pairs%friction_coefficient
+      self%full_coefficient = self%coefficient%one
       self%tolerance = settings%friction_tolerance
       self%history_kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
    end subroutine configure
+
+   !> Scale the friction coefficient.
+   subroutine scale_friction(self, factor)
+      class(exact_friction_t), intent(inout) :: self
+      real(wp), intent(in) :: factor
+
+      self%coefficient%one = factor*self%full_coefficient
+   end subroutine scale_friction
 
    !> Refuse integration schemes without a velocity in the middle of a step, and several ranks.
    subroutine check(self, settings, n_processes, error)

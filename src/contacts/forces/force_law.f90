@@ -65,6 +65,7 @@ module polydem_force_law
       generic :: add => add_part, add_constraint
       procedure :: collect_needs
       procedure :: measure
+      procedure :: scale_friction
       procedure :: apply
       procedure :: apply_elastic
       procedure :: stiffen
@@ -212,6 +213,19 @@ contains
       end do
       if (allocated(law%constraint)) call law%constraint%measure(bodies)
    end subroutine measure
+
+   !> Scale all friction coefficients relative to those of the settings.
+   subroutine scale_friction(law, factor)
+      class(force_law_t), intent(inout) :: law
+      !> The factor; with 0 there is no friction, but the contact history stays
+      real(wp), intent(in) :: factor
+      integer :: k
+
+      do k = 1, size(law%parts)
+         call law%parts(k)%part%scale_friction(factor)
+      end do
+      if (allocated(law%constraint)) call law%constraint%scale_friction(factor)
+   end subroutine scale_friction
 
    !> Refuse settings that exclude a part of the law.
    subroutine check_law(settings, n_processes, error)

@@ -9,7 +9,7 @@ module polydem_law_part
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: history_kind_t
    use polydem_errors, only: error_t
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: ip, wp
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t, settings_t
    implicit none
@@ -32,6 +32,8 @@ module polydem_law_part
       procedure :: check
       !> Measure the bodies
       procedure :: measure
+      !> Scale its friction
+      procedure :: scale_friction
       !> Add its springs and dashpots to those of a contact
       procedure :: stiffen
    end type law_part_t
@@ -72,6 +74,16 @@ contains
       associate (unused_self => self, unused_bodies => bodies)
       end associate
    end subroutine measure
+
+   !> Scale its friction coefficients relative to those of the settings. Default: it has none.
+   subroutine scale_friction(self, factor)
+      class(law_part_t), intent(inout) :: self
+      !> The factor
+      real(wp), intent(in) :: factor
+
+      associate (unused_self => self, unused => factor)
+      end associate
+   end subroutine scale_friction
 
    !> Add the springs and dashpots to those of a contact, for the stable step. Default: none. The parts add theirs in
    !> the order of their stages.

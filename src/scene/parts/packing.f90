@@ -119,6 +119,7 @@ contains
       do k = 1, size(motions)
          associate (motion => motions(k))
             if (motion%kind /= 'rotation' .or. max(motion%start, motion%ramp) > 0.0_wp) cycle
+            if (motion%stage /= '') cycle
             if (motion%wall /= '' .and. wall /= '' .and. motion%wall /= wall) cycle
             rate = 2.0_wp*pi*motion%rate
             velocities(1, :) = velocities(1, :) - rate*(centres(2, :) - motion%pivot(2))

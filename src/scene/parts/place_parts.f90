@@ -19,18 +19,11 @@ module polydem_place_parts
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_start_velocities, only: choose_moving_grains, draw_spins, draw_velocities, remove_momentum, set_speed
    use polydem_strings, only: to_text
+   use polydem_wall_bodies, only: wall_bodies_t
    use polydem_wall_outlines, only: check_corners, outline_wall, problem_t
    implicit none
    private
-   public :: list_parts, wall_bodies_t
-
-   !> Identifiers of the bodies of a wall
-   type :: wall_bodies_t
-      !> Name of the wall
-      character(len=:), allocatable :: name
-      !> Identifiers
-      integer(ip), allocatable :: id(:)
-   end type wall_bodies_t
+   public :: list_parts
 
    !> Greatest length of a region over the greatest length of a grain. Longer regions need too much time to fill
    real(wp), parameter :: longest_region = 1.0e5_wp

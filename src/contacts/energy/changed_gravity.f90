@@ -1,0 +1,49 @@
+!> A change of gravity between two steps, in the energy balance.
+!>
+!> The potential energy of gravity and its impulse are those of the present acceleration, as if it had always acted. So
+!> the values at the start change with it: by the jump of the potential energy, and by the impulse that the former
+!> acceleration gave in place of the new one. The residuals do not change.
+module polydem_changed_gravity
+   use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
+   use polydem_energy_balance, only: energy_balance_t
+   use polydem_exact_all_reduce, only: all_reduce_exact_sums
+   use polydem_exact_sum, only: exact_sum_t
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: change_gravity
+
+contains
+
+   !> Change the values at the start at the end of a step, after which another acceleration of gravity acts. Collective.
+   subroutine change_gravity(sums, comm, dt, former, gravity, bodies)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      class(communicator_t), intent(inout) :: comm
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Former and new acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: former(2), gravity(2)
+      !> Bodies at the end of the step
+      type(bodies_t), intent(in) :: bodies
+      type(exact_sum_t) :: partial(3)
+      real(wp) :: total(3), elapsed
+      integer(ip) :: k
+
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (m => bodies%mass(bodies%free(k)), x => bodies%position(:, bodies%free(k)))
+            call partial(1)%add(m)
+            call partial(2)%add(m*x(1))
+            call partial(3)%add(m*x(2))
+         end associate
+      end do
+      call all_reduce_exact_sums(comm, partial)
+      total = partial%value()
+      ! The rate of a step counts half before its end and half after it.
+      elapsed = dt*(real(sums%steps, wp) + 0.5_wp)
+      sums%start(1) = sums%start(1) - (gravity(1) - former(1))*total(2) - (gravity(2) - former(2))*total(3)
+      sums%start(2:3) = sums%start(2:3) - elapsed*total(1)*(gravity - former)
+   end subroutine change_gravity
+
+end module polydem_changed_gravity

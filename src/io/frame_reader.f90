@@ -1,0 +1,108 @@
+!> Reads the bodies of a frame of a result.
+module polydem_frame_reader
+   use polydem_body_list, only: body_list_t
+   use polydem_elementary, only: sine_and_cosine
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_file_system, only: exists
+   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_result_files, only: segment_path
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: find_frame, list_frame
+
+contains
+
+   !> Find the closed segment of a result that has a frame.
+   subroutine find_frame(folder, number, path, row, time, error)
+      !> Result folder
+      character(len=*), intent(in) :: folder
+      !> Number of the frame in the result, from 0
+      integer(ip), intent(in) :: number
+      !> Path of the segment
+      character(len=:), allocatable, intent(out) :: path
+      !> Number of frames before it in the segment
+      integer(lp), intent(out) :: row
+      !> Simulated time of the frame [s]
+      real(dp), intent(out) :: time
+      !> Allocated if there is no such frame
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      real(dp), allocatable :: times(:)
+      integer(ip) :: k
+
+      row = int(number, lp)
+      time = 0.0_dp
+      k = 1_ip
+      do while (exists(segment_path(folder, k), error))
+         path = segment_path(folder, k)
+         call file%open(path, error)
+         if (allocated(error)) return
+         call file%read('/frames/time', times, error)
+         call file%close(error)
+         if (allocated(error)) return
+         if (row < size(times, kind=lp)) then
+            time = times(row + 1_lp)
+            return
+         end if
+         row = row - size(times, kind=lp)
+         k = k + 1_ip
+      end do
+      call raise(error, input_error, folder//' has no frame '//to_text(number)//' in closed segments, only '// &
+                 to_text(int(number, lp) - row)//' frames, counted from 0')
+   end subroutine find_frame
+
+   !> Append the bodies of a frame to a list, with their identifiers, masses and velocities.
+   subroutine list_frame(path, row, list, error)
+      !> Path of the segment
+      character(len=*), intent(in) :: path
+      !> Number of frames before this one in the segment
+      integer(lp), intent(in) :: row
+      type(body_list_t), intent(inout) :: list
+      !> Names the file and what is wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      integer(ip), allocatable :: id(:), fixed(:), start(:)
+      real(dp), allocatable :: shape(:, :), mass(:), inertia(:), position(:, :, :), angle(:, :), velocity(:, :, :), &
+         spin(:, :)
+      real(wp), allocatable :: corners(:, :)
+      real(wp) :: c, s
+      integer(ip) :: k, v
+
+      call file%open(path, error)
+      if (allocated(error)) return
+      call file%read('/bodies/id', id, error)
+      call file%read('/bodies/fixed', fixed, error)
+      call file%read('/bodies/vertex_start', start, error)
+      call file%read('/bodies/vertex', shape, error)
+      call file%read('/bodies/mass', mass, error)
+      call file%read('/bodies/inertia', inertia, error)
+      call file%read('/frames/position', position, error, rows=[row, 1_lp])
+      call file%read('/frames/angle', angle, error, rows=[row, 1_lp])
+      call file%read('/frames/velocity', velocity, error, rows=[row, 1_lp])
+      call file%read('/frames/angular_velocity', spin, error, rows=[row, 1_lp])
+      call file%close(error)
+      if (allocated(error)) return
+      if (any([size(fixed), size(mass), size(inertia), size(start) - 1, size(position, 2), size(angle, 1), &
+               size(velocity, 2), size(spin, 1)] /= size(id))) then
+         call raise(error, input_error, path//': its data sets have different numbers of bodies')
+         return
+      end if
+      do k = 1_ip, size(id, kind=ip)
+         call sine_and_cosine(real(angle(k, 1), wp), s, c)
+         corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
+         do v = 1_ip, size(corners, 2, kind=ip)
+            corners(:, v) = [c*corners(1, v) - s*corners(2, v), s*corners(1, v) + c*corners(2, v)] &
+                            + real(position(:, k, 1), wp)
+         end do
+         if (fixed(k) == 1_ip) then
+            call list%append(corners, fixed=.true., id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp))
+         else
+            call list%append(corners, velocity=real(velocity(:, k, 1), wp), angular_velocity=real(spin(k, 1), wp), &
+                             id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp))
+         end if
+      end do
+   end subroutine list_frame
+
+end module polydem_frame_reader

@@ -1,0 +1,89 @@
+!> The names of walls in the files of a result, a text of the provenance: 'floor 101-103; lid 104 107'.
+module polydem_wall_names
+   use polydem_errors, only: error_t
+   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_kinds, only: ip
+   use polydem_strings, only: split_words, to_text
+   use polydem_wall_bodies, only: wall_bodies_t
+   implicit none
+   private
+   public :: wall_names_text, find_wall_names
+
+contains
+
+   !> Text of the walls with their names and the identifiers of their bodies
+   pure function wall_names_text(walls) result(text)
+      !> The walls
+      type(wall_bodies_t), intent(in) :: walls(:)
+      character(len=:), allocatable :: text
+      integer :: first, k, last
+
+      text = ''
+      do k = 1, size(walls)
+         if (walls(k)%name == '') cycle
+         if (text /= '') text = text//'; '
+         text = text//walls(k)%name
+         associate (id => walls(k)%id)
+            first = 1
+            do while (first <= size(id))
+               last = first
+               do while (last < size(id))
+                  if (id(last + 1) /= id(last) + 1_ip) exit
+                  last = last + 1
+               end do
+               text = text//' '//to_text(id(first))
+               if (last > first) text = text//'-'//to_text(id(last))
+               first = last + 1
+            end do
+         end associate
+      end do
+   end function wall_names_text
+
+   !> Find the names of the walls of a result, and their bodies.
+   subroutine find_wall_names(path, walls, error)
+      !> A file of the result
+      character(len=*), intent(in) :: path
+      !> The walls; none if the result has no names
+      type(wall_bodies_t), allocatable, intent(out) :: walls(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      character(len=:), allocatable :: text
+      type(wall_bodies_t) :: wall
+      integer :: last
+
+      allocate (walls(0))
+      call file%open(path, error)
+      if (allocated(error)) return
+      text = ''
+      if (file%has('/provenance/walls', error)) call file%read('/provenance/walls', text, error)
+      call file%close(error)
+      if (allocated(error)) return
+      do while (text /= '')
+         last = index(text//';', ';') - 1
+         call read_wall(text(:last), wall)
+         walls = [walls, wall]
+         text = trim(adjustl(text(min(last + 2, len(text) + 1):)))
+      end do
+   end subroutine find_wall_names
+
+   !> Read the name and the identifiers of a wall.
+   subroutine read_wall(text, wall)
+      character(len=*), intent(in) :: text
+      type(wall_bodies_t), intent(out) :: wall
+      character(len=:), allocatable :: words(:)
+      integer(ip) :: first, id, last
+      integer :: dash, k, status
+
+      words = split_words(text)
+      wall%name = trim(words(1))
+      allocate (wall%id(0))
+      do k = 2, size(words)
+         dash = index(words(k), '-')
+         read (words(k)(:merge(len(words), dash - 1, dash == 0)), *, iostat=status) first
+         last = first
+         if (dash > 0 .and. status == 0) read (words(k)(dash + 1:), *, iostat=status) last
+         if (status == 0) wall%id = [wall%id, [(id, id=first, last)]]
+      end do
+   end subroutine read_wall
+
+end module polydem_wall_names

@@ -1,0 +1,269 @@
+!> Start from a result: from its last checkpoint, or from one of its frames.
+!>
+!> A checkpoint has the whole state. The run goes on from it as the run of the result would, at time 0: contact history,
+!> accelerations and state of the integrator are those of the checkpoint. The forces at time 0 follow from a copy of the
+!> history, since evaluating them changes it. A frame has poses and velocities only.
+module polydem_start_from
+   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_body_fields, only: serialize_bodies
+   use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_checkpoint_bodies, only: read_bodies
+   use polydem_checkpoint_fields, only: attempts_t, read_pairs, serialize_progress
+   use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_file_system, only: exists
+   use polydem_frame_reader, only: find_frame, list_frame
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_replace_bodies, only: settle_bodies
+   use polydem_result_files, only: checkpoint_path, n_checkpoints
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_source_locations, only: place_of
+   use polydem_strings, only: quoted, suggestion, to_text
+   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall_names, only: find_wall_names
+   implicit none
+   private
+   public :: origin_t, find_origin, read_start, recall_history, return_to_state
+
+   !> Where a run starts
+   type :: origin_t
+      !> Path of the checkpoint, or of the segment that has the frame
+      character(len=:), allocatable :: path
+      !> Whether it is a frame
+      logical :: is_frame = .false.
+      !> Number of frames before it in its segment
+      integer(lp) :: row = 0_lp
+      !> What the log says of it
+      character(len=:), allocatable :: note
+   end type origin_t
+
+contains
+
+   !> Find the last checkpoint of the result from which a run starts, or its frame.
+   subroutine find_origin(settings, origin, error)
+      !> Settings with `start_from` in the group &scene
+      type(settings_t), intent(in) :: settings
+      type(origin_t), intent(out) :: origin
+      !> Names the entry and what is wrong with the result
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: folder
+      real(dp) :: time
+      integer(ip) :: number
+      integer :: colon, status
+
+      folder = settings%scene%start_from
+      colon = index(folder, ':', back=.true.)
+      if (colon > 0) then
+         if (verify(folder(colon + 1:), '0123456789') == 0 .and. colon < len(folder)) then
+            read (folder(colon + 1:), *, iostat=status) number
+            if (status /= 0) number = huge(1_ip)
+            folder = folder(:colon - 1)
+            origin%is_frame = .true.
+            call find_frame(folder, number, origin%path, origin%row, time, error)
+            if (.not. allocated(error)) origin%note = 'start      from frame '//to_text(number)//' of '//folder// &
+               ', at '//to_text(real(time, wp))//' s; contact history and accelerations begin anew'
+         end if
+      end if
+      if (.not. origin%is_frame) call find_checkpoint(folder, origin, error)
+      if (allocated(error)) call blame(settings, error)
+   end subroutine find_origin
+
+   !> Let a message name the entry.
+   pure subroutine blame(settings, error)
+      type(settings_t), intent(in) :: settings
+      type(error_t), intent(inout) :: error
+
+      error%message = place_of(settings, 'scene', 'start_from')//": 'start_from' in &scene: "//error%message
+   end subroutine blame
+
+   !> Find the newest checkpoint of a result. One that is damaged is an error, since the state would be an earlier one.
+   subroutine find_checkpoint(folder, origin, error)
+      character(len=*), intent(in) :: folder
+      type(origin_t), intent(inout) :: origin
+      type(error_t), allocatable, intent(inout) :: error
+      type(checkpoint_file_t) :: file
+      type(attempts_t) :: attempts
+      integer(lp) :: step, newest
+      integer(ip) :: k
+
+      newest = -1_lp
+      do k = 1_ip, n_checkpoints
+         if (.not. exists(checkpoint_path(folder, k), error)) cycle
+         call file%open(checkpoint_path(folder, k), error)
+         if (allocated(error)) return
+         call serialize_progress(file, step, attempts)
+         call file%close(error)
+         if (allocated(error)) return
+         if (step <= newest) cycle
+         newest = step
+         origin%path = checkpoint_path(folder, k)
+         origin%note = 'start      from '//origin%path//', step '//to_text(step)//', with contact history'
+      end do
+      if (newest < 0_lp) call raise(error, input_error, folder//' holds no checkpoint. Let its run end with '// &
+         'checkpoint.at_end = .true., or start from a frame, such as '//quoted(folder//':0'))
+   end subroutine find_checkpoint
+
+   !> Read the bodies from which a run starts: all fixed ones, at rest, and a share of the free ones; and find the walls
+   !> that the namelist names. Collective; all ranks get the same error.
+   subroutine read_start(settings, comm, bodies, named, error)
+      type(settings_t), intent(in) :: settings
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(inout) :: bodies
+      !> Walls of the groups &wall
+      type(wall_bodies_t), allocatable, intent(out) :: named(:)
+      !> Names the entry and what is wrong with the result
+      type(error_t), allocatable, intent(inout) :: error
+      type(origin_t) :: origin
+      type(checkpoint_file_t) :: file
+      type(body_list_t) :: list
+      integer(ip) :: s
+
+      allocate (named(0))
+      call find_origin(settings, origin, error)
+      call comm%all_reduce_error(error)
+      if (allocated(error)) return
+      if (origin%is_frame) then
+         list%rank = comm%rank
+         list%n_ranks = comm%size
+         call list_frame(origin%path, origin%row, list, error)
+         if (.not. allocated(error)) call new_bodies(list, bodies, error)
+      else
+         call file%open(origin%path, error, comm)
+         if (allocated(error)) return
+         call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
+         call read_bodies(file, comm, bodies)
+         call file%close(error)
+         if (.not. allocated(error)) call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
+      end if
+      if (.not. allocated(error)) call name_walls(settings, origin%path, named, error)
+      call comm%all_reduce_error(error)
+      if (allocated(error)) return
+      do s = 1_ip, bodies%n
+         if (bodies%fixed(s)) call rest(bodies, s)
+      end do
+   end subroutine read_start
+
+   !> Let a body rest.
+   pure subroutine rest(bodies, s)
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip), intent(in) :: s
+
+      bodies%velocity(:, s) = 0.0_wp
+      bodies%angular_velocity(s) = 0.0_wp
+      bodies%acceleration(:, s) = 0.0_wp
+      bodies%angular_acceleration(s) = 0.0_wp
+   end subroutine rest
+
+   !> Find the bodies of the walls of the namelist: by their identifiers, or by the names that the result has.
+   subroutine name_walls(settings, path, named, error)
+      type(settings_t), intent(in) :: settings
+      !> File of the result
+      character(len=*), intent(in) :: path
+      type(wall_bodies_t), allocatable, intent(inout) :: named(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(wall_bodies_t), allocatable :: former(:)
+      character(len=64), allocatable :: names(:)
+      integer :: j, k, place
+
+      call find_wall_names(path, former, error)
+      if (allocated(error)) return
+      allocate (names(size(former)))
+      do j = 1, size(former)
+         names(j) = former(j)%name
+      end do
+      deallocate (named)
+      allocate (named(size(settings%wall)))
+      do k = 1, size(settings%wall)
+         associate (wall => settings%wall(k))
+            named(k)%name = wall%name
+            named(k)%id = wall%bodies
+            if (wall%outline /= 'result') cycle
+            place = 0
+            do j = 1, size(former)
+               if (names(j) == wall%name) place = j
+            end do
+            if (place > 0) then
+               named(k)%id = former(place)%id
+            else
+               call raise(error, input_error, place_of(settings, 'wall.'//wall%name, 'outline')//': '//path// &
+                          ' has no wall '//quoted(wall%name)//suggestion(wall%name, names)// &
+                          '. Name its bodies: outline = ''bodies'' bodies = ...')
+               return
+            end if
+         end associate
+      end do
+   end subroutine name_walls
+
+   !> Let a simulation receive the contact history of the checkpoint from which it starts, before its forces are
+   !> computed. Collective; all ranks get the same error.
+   subroutine recall_history(simulation, error)
+      !> The simulation after `place_bodies`
+      type(simulation_t), intent(inout) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      type(origin_t) :: origin
+      type(checkpoint_file_t) :: file
+
+      call open_start(simulation, file, origin, error)
+      if (allocated(error) .or. origin%is_frame) return
+      ! Here the state of the integrator is only tried.
+      call file%choose_rows('/bodies/', int(simulation%bodies%global_index, lp))
+      call simulation%integrator%serialize(file)
+      if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
+         call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
+      call read_pairs(file, simulation)
+      call file%close(error)
+      if (.not. allocated(error)) return
+      error%message = error%message//'. The run of the result had other forces or another scheme; start from a '// &
+         'frame of it (FOLDER:FRAME), which needs none of this'
+      call blame(simulation%settings, error)
+   end subroutine recall_history
+
+   !> Open the checkpoint from which a simulation starts, unless it starts from a frame.
+   subroutine open_start(simulation, file, origin, error)
+      type(simulation_t), intent(inout) :: simulation
+      type(checkpoint_file_t), intent(inout) :: file
+      type(origin_t), intent(out) :: origin
+      type(error_t), allocatable, intent(inout) :: error
+
+      call find_origin(simulation%settings, origin, error)
+      call simulation%comm%all_reduce_error(error)
+      if (.not. (allocated(error) .or. origin%is_frame)) call file%open(origin%path, error, simulation%comm)
+   end subroutine open_start
+
+   !> Return to the state of the checkpoint from which a simulation starts, after its forces at time 0 were computed and
+   !> used. Collective; all ranks get the same error.
+   subroutine return_to_state(simulation, error)
+      !> The simulation before its first step
+      type(simulation_t), intent(inout) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      type(origin_t) :: origin
+      type(checkpoint_file_t) :: file
+      type(bodies_t) :: before
+      integer(ip) :: s
+
+      if (simulation%settings%scene%name /= 'result') return
+      call open_start(simulation, file, origin, error)
+      if (allocated(error) .or. origin%is_frame) return
+      associate (bodies => simulation%bodies)
+         before = bodies
+         call file%choose_rows('/bodies/', int(bodies%global_index, lp))
+         call serialize_bodies(file, bodies)
+         call simulation%integrator%serialize(file)
+         call read_pairs(file, simulation)
+         do s = 1_ip, bodies%n
+            if (.not. bodies%fixed(s)) cycle
+            bodies%position(:, s) = before%position(:, s)
+            bodies%angle(s) = before%angle(s)
+            bodies%velocity(:, s) = before%velocity(:, s)
+            bodies%angular_velocity(s) = before%angular_velocity(s)
+            bodies%acceleration(:, s) = before%acceleration(:, s)
+            bodies%angular_acceleration(s) = before%angular_acceleration(s)
+         end do
+      end associate
+      call file%close(error)
+      if (.not. allocated(error)) call settle_bodies(simulation, error)
+   end subroutine return_to_state
+
+end module polydem_start_from

@@ -1,0 +1,169 @@
+!> The start of a stage of a run: what changes there, and when the stage ends at the latest.
+!>
+!> A stage changes parameters only. Force law, contact history and time step stay those of the whole run.
+module polydem_begin_stage
+   use polydem_changed_gravity, only: change_gravity
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_run_duration, only: longest_stage
+   use polydem_simulation, only: simulation_t
+   use polydem_sort, only: place_in
+   use polydem_source_locations, only: place_of
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: prepare_stages, begin_stage, continue_stages, find_last_steps, wall_vector
+
+contains
+
+   !> Take the parameters of the first stage, before the simulation starts.
+   subroutine prepare_stages(self)
+      !> The simulation with its settings
+      type(simulation_t), intent(inout) :: self
+
+      if (size(self%settings%stage) == 0) return
+      self%stages%gravity = self%settings%forces%gravity
+      self%stages%drag = self%settings%forces%drag
+      self%stages%number = 1_ip
+      self%stages%first = [0_lp]
+      call set_parameters(self, 1_ip)
+   end subroutine prepare_stages
+
+   !> Take the parameters of a stage.
+   subroutine set_parameters(self, number)
+      type(simulation_t), intent(inout) :: self
+      integer(ip), intent(in) :: number
+
+      associate (stage => self%settings%stage(number), stages => self%stages, forces => self%settings%forces)
+         forces%gravity = stages%gravity
+         if (size(stage%gravity) == 2) forces%gravity = stage%gravity
+         forces%drag = stages%drag + stage%drag
+         stages%friction_scale = stage%friction_scale
+      end associate
+   end subroutine set_parameters
+
+   !> Begin the next stage at the end of a step. Collective.
+   subroutine begin_stage(self)
+      !> The simulation at the last step of a stage that others follow
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: former(2)
+
+      former = self%settings%forces%gravity
+      associate (stages => self%stages)
+         stages%number = stages%number + 1_ip
+         stages%first = [stages%first, self%step]
+         stages%is_decided = .false.
+         stages%held_since = -1_lp
+         stages%value = -1.0_wp
+         call set_parameters(self, stages%number)
+         if (self%settings%stage(stages%number)%until == 'strain') stages%reference = wall_vector(self)
+      end associate
+      associate (gravity => self%settings%forces%gravity)
+         if (self%settings%output%energy_balance .and. any(abs(gravity - former) > 0.0_wp)) call change_gravity( &
+            self%energy_balance, self%comm, self%dt, former, gravity, self%bodies)
+      end associate
+      call use_parameters(self)
+      call find_last_steps(self)
+   end subroutine begin_stage
+
+   !> Let force law, other forces, free flight and motions use the parameters of the present stage.
+   subroutine use_parameters(self)
+      type(simulation_t), intent(inout) :: self
+      integer :: j, k
+
+      call self%law%scale_friction(self%stages%friction_scale)
+      call self%body_forces%configure(self%settings%forces)
+      call self%flight%start(self%settings%forces%gravity, allocated(self%body_forces%list), self%integrator, &
+                             self%bodies%n)
+      do j = 1, size(self%walls)
+         do k = 1, size(self%walls(j)%motions)
+            associate (motion => self%walls(j)%motions(k), stages => self%stages)
+               if (motion%stage == 0_ip .or. motion%stage > stages%number) cycle
+               motion%start = real(stages%first(motion%stage), wp)*self%dt
+               motion%end = huge(1.0_wp)
+               if (motion%stage < stages%number) motion%end = real(stages%first(motion%stage + 1_ip), wp)*self%dt
+            end associate
+         end do
+      end do
+   end subroutine use_parameters
+
+   !> Find the last step of the present stage, unless its condition has decided it, and of the run.
+   subroutine find_last_steps(self)
+      !> The simulation with its time step
+      type(simulation_t), intent(inout) :: self
+      integer(ip) :: k
+
+      associate (stages => self%stages, settings => self%settings%stage)
+         if (.not. stages%is_decided) stages%last = stages%first(stages%number) + steps_of(self, stages%number)
+         self%n_steps = stages%last
+         do k = stages%number + 1_ip, size(settings, kind=ip)
+            self%n_steps = self%n_steps + steps_of(self, k)
+         end do
+      end associate
+   end subroutine find_last_steps
+
+   !> Greatest number of steps of a stage
+   pure integer(lp) function steps_of(self, number)
+      type(simulation_t), intent(in) :: self
+      integer(ip), intent(in) :: number
+
+      steps_of = max(1_lp, nint(longest_stage(self%settings%stage(number))/self%dt, lp))
+   end function steps_of
+
+   !> Go on in the stage of a checkpoint, at the start with the first stage. Collective; all ranks get the same error.
+   subroutine continue_stages(self, error)
+      !> The simulation with the stages of the checkpoint, or at time 0
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if the namelist does not have this stage, or if the stage is shorter now
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (self%stages%number == 0_ip .or. allocated(error)) return
+      if (self%stages%number > size(self%settings%stage)) then
+         call raise(error, input_error, 'the run is in its stage '//to_text(self%stages%number)//', but the '// &
+                    'namelist has only '//to_text(size(self%settings%stage, kind=ip))//' groups &stage')
+         return
+      end if
+      call set_parameters(self, self%stages%number)
+      call use_parameters(self)
+      call find_last_steps(self)
+      associate (stage => self%settings%stage(self%stages%number))
+         if (self%step > self%stages%last) call raise(error, input_error, place_of(self%settings, &
+            'stage.'//stage%name, merge('duration', 'longest ', stage%until == 'duration'))//': the run is at step '// &
+            to_text(self%step)//', behind the last step of the stage '//stage%name//', '//to_text(self%stages%last))
+         if (allocated(error)) return
+         if (self%step == 0_lp .and. stage%until == 'strain') self%stages%reference = wall_vector(self)
+      end associate
+   end subroutine continue_stages
+
+   !> Vector from the wall `opposite` to the wall `wall` of the present stage, between the means of the centres of their
+   !> bodies (2) [m]
+   function wall_vector(self) result(vector)
+      type(simulation_t), intent(in) :: self
+      real(wp) :: vector(2)
+
+      associate (stage => self%settings%stage(self%stages%number))
+         vector = centre_of(stage%wall) - centre_of(stage%opposite)
+      end associate
+
+   contains
+
+      !> Mean of the centres of the bodies of a wall
+      pure function centre_of(name) result(centre)
+         character(len=*), intent(in) :: name
+         real(wp) :: centre(2)
+         integer :: j, k
+
+         centre = 0.0_wp
+         do k = 1, size(self%named_walls)
+            if (self%named_walls(k)%name /= name) cycle
+            associate (id => self%named_walls(k)%id)
+               do j = 1, size(id)
+                  centre = centre + self%bodies%position(:, place_in(self%bodies%id, id(j)))/real(size(id), wp)
+               end do
+            end associate
+         end do
+      end function centre_of
+
+   end function wall_vector
+
+end module polydem_begin_stage

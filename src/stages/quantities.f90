@@ -1,0 +1,219 @@
+!> Quantities of the whole sample at the end of a step, from exact sums over all ranks.
+!>
+!> All ranks get the same bits for any number of ranks and threads and with any finder. Those that need contacts need
+!> the table of contacts of the step (`advance` with `tabulate`).
+module polydem_quantities
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contact_force
+   use polydem_elementary, only: hypotenuse
+   use polydem_exact_all_reduce, only: all_reduce_exact_sums
+   use polydem_exact_sum, only: exact_sum_t
+   use polydem_force_sums, only: total_forces
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_ownership, only: owns_pair
+   use polydem_polygon, only: signed_area
+   use polydem_simulation, only: simulation_t
+   implicit none
+   private
+   public :: kinetic_energy, unbalanced_force, coordination, count_grains, solid_fraction, stress, inertial_number
+
+contains
+
+   !> Find the kinetic energy per free body [J/m]; 0 if there is none. Collective.
+   subroutine kinetic_energy(simulation, energy)
+      type(simulation_t), intent(inout) :: simulation
+      !> Mean kinetic energy of translation and rotation
+      real(wp), intent(out) :: energy
+      real(wp) :: total(2)
+      type(exact_sum_t) :: sums(2)
+      integer(ip) :: k
+
+      associate (bodies => simulation%bodies)
+         do k = 1_ip, size(bodies%free, kind=ip)
+            associate (s => bodies%free(k))
+               call sums(1)%add(0.5_wp*bodies%mass(s)*(bodies%velocity(1, s)**2 + bodies%velocity(2, s)**2) &
+                                + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2)
+               call sums(2)%add(1.0_wp)
+            end associate
+         end do
+      end associate
+      call all_reduce_exact_sums(simulation%comm, sums)
+      total = sums%value()
+      energy = ratio(total(1), total(2))
+   end subroutine kinetic_energy
+
+   !> Find the unbalanced force: the mean magnitude of the total force on a free body, with gravity, over the mean
+   !> magnitude of the force of a contact. Huge if there is no contact. Collective.
+   subroutine unbalanced_force(simulation, unbalanced)
+      !> The simulation with the table of contacts of this step
+      type(simulation_t), intent(inout) :: simulation
+      !> Ratio of the means
+      real(wp), intent(out) :: unbalanced
+      type(exact_sum_t) :: sums(4)
+      real(wp) :: total(4), force(2)
+      integer(ip) :: c, k
+
+      associate (bodies => simulation%bodies, contacts => simulation%contacts)
+         call total_forces(simulation%settings%forces%gravity, simulation%force_sums, bodies)
+         do k = 1_ip, size(bodies%free, kind=ip)
+            call sums(1)%add(hypotenuse(bodies%force(1, bodies%free(k)), bodies%force(2, bodies%free(k))))
+            call sums(2)%add(1.0_wp)
+         end do
+         do c = 1_ip, contacts%n
+            if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+            force = contact_force(contacts, c)
+            call sums(3)%add(hypotenuse(force(1), force(2)))
+            call sums(4)%add(1.0_wp)
+         end do
+      end associate
+      call all_reduce_exact_sums(simulation%comm, sums)
+      total = sums%value()
+      unbalanced = huge(1.0_wp)
+      if (total(3) > 0.0_wp) unbalanced = ratio(total(1), total(2))/ratio(total(3), total(4))
+   end subroutine unbalanced_force
+
+   !> Find the coordination: the mean number of contacts of a free body, also with fixed bodies. Collective.
+   subroutine coordination(simulation, number)
+      !> The simulation with the table of contacts of this step
+      type(simulation_t), intent(inout) :: simulation
+      !> Mean number of contacts
+      real(wp), intent(out) :: number
+      integer(lp) :: counts(2)
+      integer(ip) :: c
+
+      associate (bodies => simulation%bodies, contacts => simulation%contacts)
+         counts = [0_lp, size(bodies%free, kind=lp)]
+         do c = 1_ip, contacts%n
+            counts(1) = counts(1) + merge(1_lp, 0_lp, is_mine(bodies, contacts%first(c))) &
+                        + merge(1_lp, 0_lp, is_mine(bodies, contacts%second(c)))
+         end do
+      end associate
+      call simulation%comm%all_reduce_sum(counts)
+      number = ratio(real(counts(1), wp), real(counts(2), wp))
+   end subroutine coordination
+
+   !> Count the free bodies whose centres are in a rectangle. Collective.
+   subroutine count_grains(simulation, low, high, number)
+      type(simulation_t), intent(inout) :: simulation
+      !> Lower left and upper right corner of the rectangle, (2) [m]
+      real(wp), intent(in) :: low(2), high(2)
+      !> Their number
+      real(wp), intent(out) :: number
+      integer(lp) :: counts(1)
+      integer(ip) :: k
+
+      counts = 0_lp
+      associate (bodies => simulation%bodies)
+         do k = 1_ip, size(bodies%free, kind=ip)
+            if (is_inside(bodies%position(:, bodies%free(k)), low, high)) counts = counts + 1_lp
+         end do
+      end associate
+      call simulation%comm%all_reduce_sum(counts)
+      number = real(counts(1), wp)
+   end subroutine count_grains
+
+   !> Find the solid fraction in a rectangle: the area of the free bodies whose centres are in it, over its area.
+   !> Collective.
+   subroutine solid_fraction(simulation, low, high, fraction)
+      type(simulation_t), intent(inout) :: simulation
+      !> Lower left and upper right corner of the rectangle, (2) [m]
+      real(wp), intent(in) :: low(2), high(2)
+      !> The fraction; overlaps count twice
+      real(wp), intent(out) :: fraction
+      type(exact_sum_t) :: sums(1)
+      real(wp) :: total(1)
+      integer(ip) :: k
+
+      associate (bodies => simulation%bodies)
+         do k = 1_ip, size(bodies%free, kind=ip)
+            if (is_inside(bodies%position(:, bodies%free(k)), low, high)) &
+               call sums(1)%add(signed_area(bodies%pieces%polygon(bodies%free(k))))
+         end do
+      end associate
+      call all_reduce_exact_sums(simulation%comm, sums)
+      total = sums%value()
+      fraction = total(1)/((high(1) - low(1))*(high(2) - low(2)))
+   end subroutine solid_fraction
+
+   !> Find the mean stress of the contacts in an area: the sum over the contacts of free bodies of the outer product of
+   !> the vector from the centre of the body to the contact and the force on the body, over the area, with the sign of
+   !> soil mechanics: positive in compression. For contacts in equilibrium this is the formula of Love and Weber.
+   !> Collective.
+   subroutine stress(simulation, area, tensor)
+      !> The simulation with the table of contacts of this step
+      type(simulation_t), intent(inout) :: simulation
+      !> Area that the sample occupies [m2]
+      real(wp), intent(in) :: area
+      !> Stress, (direction of the vector, direction of the force) [N/m]
+      real(wp), intent(out) :: tensor(2, 2)
+      type(exact_sum_t) :: sums(4)
+      real(wp) :: force(2)
+      integer(ip) :: c
+
+      associate (bodies => simulation%bodies, contacts => simulation%contacts)
+         do c = 1_ip, contacts%n
+            force = contact_force(contacts, c)
+            if (is_mine(bodies, contacts%first(c))) call add(contacts%arm_first(:, c), force)
+            if (is_mine(bodies, contacts%second(c))) call add(contacts%arm_second(:, c), -force)
+         end do
+      end associate
+      call all_reduce_exact_sums(simulation%comm, sums)
+      tensor = reshape(-sums%value(), [2, 2])/area
+
+   contains
+
+      !> Add the outer product of an arm and a force.
+      subroutine add(arm, force)
+         real(wp), intent(in) :: arm(2), force(2)
+         integer :: i, j
+
+         do j = 1, 2
+            do i = 1, 2
+               call sums(2*(j - 1) + i)%add(arm(i)*force(j))
+            end do
+         end do
+      end subroutine add
+
+   end subroutine stress
+
+   !> Inertial number of a flow in the plane, the shear rate times d sqrt(rho/P) (GDR MiDi, Eur. Phys. J. E 14 (2004)
+   !> 341): the ratio of the time in which pressure moves a grain by its diameter to that of the shear
+   pure real(wp) function inertial_number(shear_rate, diameter, density, pressure) result(number)
+      !> Shear rate [1/s]
+      real(wp), intent(in) :: shear_rate
+      !> Diameter of a grain [m]
+      real(wp), intent(in) :: diameter
+      !> Density of a grain [kg/m3]
+      real(wp), intent(in) :: density
+      !> Pressure [N/m2]
+      real(wp), intent(in) :: pressure
+
+      number = huge(1.0_wp)
+      if (pressure > 0.0_wp) number = abs(shear_rate)*diameter*sqrt(density/pressure)
+   end function inertial_number
+
+   !> Whether this rank moves a body
+   pure logical function is_mine(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+
+      is_mine = .not. (bodies%fixed(s) .or. bodies%in_halo(s))
+   end function is_mine
+
+   !> Whether a point is in a rectangle, its lower and left edges included
+   pure logical function is_inside(point, low, high)
+      real(wp), intent(in) :: point(2), low(2), high(2)
+
+      is_inside = all(point >= low) .and. all(point < high)
+   end function is_inside
+
+   !> A quotient; 0 if the divisor is 0
+   pure real(wp) function ratio(dividend, divisor)
+      real(wp), intent(in) :: dividend, divisor
+
+      ratio = 0.0_wp
+      if (divisor > 0.0_wp) ratio = dividend/divisor
+   end function ratio
+
+end module polydem_quantities

@@ -1,0 +1,235 @@
+"""Runs in stages: they equal runs that start from each other, and any restart, number of threads and ranks.
+
+usage: check_stages.py PROGRAM
+"""
+
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from check_continue import BAD_INPUT, FAILED
+
+#: A box with grains and a lid; the step is a power of two, so that times of a stage are exact differences
+SCENE = """\
+&wall name = 'floor' outline = 'rectangle' low = -0.1, -0.02 high = 0.1, 0 /
+&wall name = 'left' outline = 'rectangle' low = -0.07, 0 high = -0.05, 0.3 /
+&wall name = 'right' outline = 'rectangle' low = 0.05, 0 high = 0.07, 0.3 /
+&wall name = 'lid' outline = 'rectangle' low = -0.049, 0.1 high = 0.049, 0.11 /
+&grains name = 'sand' region = 'box' low = -0.05, 0 high = 0.05, 0.1 number = 60 arrangement = 'spread' speed = 0.5
+   seed = {seed} /
+&forces stiffness = 2e5 friction_coefficient = 0.5 /
+"""
+#: The same walls in a scene that starts from a result
+FOUND = "".join(f"&wall name = '{name}' outline = 'result' /\n" for name in ("floor", "left", "right", "lid"))
+OUTPUT = """\
+&integrate dt = 3.0517578125e-5 {duration} {scheme} /
+&output frame_interval = 1e-3 frames_per_segment = 5 contacts = .true. /
+"""
+#: Groups of each stage of 256 steps
+STAGES = (
+    "&stage name = 'fall' duration = 7.8125e-3 gravity = 0, -60 friction_scale = 0 /\n",
+    "&stage name = 'press' duration = 7.8125e-3 gravity = 20, -60 /\n"
+    "&motion name = 'down' wall = 'lid' kind = 'translation' velocity = 0, -2 ramp = 2e-3 stage = 'press' /\n",
+    "&stage name = 'shake' duration = 7.8125e-3 gravity = 0, 0 friction_scale = 2 /\n"
+    "&motion name = 'shift' wall = 'lid' kind = 'oscillation' amplitude = 2e-3, 1e-3 frequency = 200\n"
+    "   stage = 'shake' /\n"
+    "&motion name = 'tilt' wall = 'floor' kind = 'rotation' rate = 0.5 stage = 'shake' /\n",
+)
+#: Stages that conditions end
+CONDITIONS = """\
+&stage name = 'fall' until = 'kinetic' below = 6e-3 hold = 2e-3 longest = 1 check = 7 gravity = 0, -60
+   friction_scale = 0 /
+&stage name = 'press' until = 'strain' wall = 'lid' opposite = 'floor' above = 0.1 longest = 1 check = 10 /
+&motion name = 'down' wall = 'lid' kind = 'translation' velocity = 0, -2 ramp = 2e-3 stage = 'press' /
+&stage name = 'count' until = 'count' low = -0.05, 0 high = 0.05, 0.02 above = 9 longest = 1 check = 3
+   gravity = 0, -99 /
+&stage name = 'fill' until = 'solid_fraction' low = -0.05, 0 high = 0.05, 0.05 above = 0.5 longest = 1 /
+&stage name = 'rest' until = 'unbalanced' below = 0.3 longest = 1 drag = 20 check = 25 /
+"""
+SEVERAL = ("--set", "checkpoint.steps=50")
+
+
+class Case:
+    """The programs, and how to start them."""
+
+    def __init__(self, program):
+        self.program = program
+        self.parallel = os.environ.get("POLYDEM_MPI_PROGRAM")
+
+    def run(self, text, folder, *options, ranks=None, threads=1, code=0):
+        """Run a namelist; return the output, or the message if the run is to fail."""
+        process = self.start(text, folder, *options, ranks=ranks, threads=threads)
+        output, message = process.communicate()
+        assert process.returncode == code, (process.returncode, message, output[-2000:])
+        return message if code else output
+
+    def start(self, text, folder, *options, ranks=None, threads=1):
+        with open(f"{folder}.nml", "w", encoding="utf-8") as file:
+            file.write(text)
+        command = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", str(ranks), self.parallel] if ranks else [
+            self.program]
+        command += ["run", f"{folder}.nml", "--threads", str(threads), "--set", f"output.folder={folder}", *options]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
+                                text=True, env={**os.environ, "OMP_WAIT_POLICY": "passive"})
+
+
+def hash_of(output):
+    return re.search(r"^state hash: (\S+)", output, re.MULTILINE).group(1)
+
+
+def starts_of(output):
+    """Names of the stages, and the steps at which they began."""
+    return re.findall(r"^stage      (\w+), \d of \d, from step (\d+)", output, re.MULTILINE)
+
+
+def whole(stages, scheme="", seed=1):
+    return SCENE.format(seed=seed) + "".join(stages) + OUTPUT.format(duration="", scheme=scheme)
+
+
+def stages_are_runs_that_start_from_each_other(case):
+    """Finds contact history, accelerations or poses that a start from a result loses, and stages that shift motions."""
+    for k, scheme in enumerate(("", "scheme = 'gear'", "accumulation = 'compensated'")):
+        one = case.run(whole(STAGES, scheme), f"one_{k}")
+        assert starts_of(one) == [("fall", "0"), ("press", "256"), ("shake", "512")], one
+        case.run(whole(STAGES[:1], scheme), f"chain_{k}_0")
+        for number in (1, 2):
+            scene = f"&scene name = 'result' start_from = 'chain_{k}_{number - 1}' /\n" + FOUND
+            output = case.run(scene + "&forces stiffness = 2e5 friction_coefficient = 0.5 /\n" + STAGES[number]
+                              + OUTPUT.format(duration="", scheme=scheme), f"chain_{k}_{number}")
+            assert "step 256, with contact history" in output, output
+        assert hash_of(output) == hash_of(one), scheme
+        if case.parallel:
+            output = case.run(scene + "&forces stiffness = 2e5 friction_coefficient = 0.5 /\n" + STAGES[2]
+                              + OUTPUT.format(duration="", scheme=scheme), f"ranks_{k}", ranks=3)
+            assert hash_of(output) == hash_of(one), scheme
+        # Its energy closes although gravity changes.
+        residual = float(re.search(r"energy (\S+) of the largest", one).group(1))
+        momentum = float(re.search(r"momentum (\S+),", one).group(1))
+        assert residual < 0.03 and (momentum < 1e-12 or "gear" in scheme), one
+
+
+def a_frame_is_a_start_without_history(case):
+    case.run(whole(STAGES), "film")
+    scene = "&scene name = 'result' start_from = 'film:{frame}' /\n" + FOUND
+    rest = "&forces stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 1e-3", scheme="")
+    output = case.run(scene.format(frame=12) + rest, "from_frame")
+    assert "from frame 12 of film" in output and "contact history and accelerations begin anew" in output, output
+    message = case.run(scene.format(frame=999) + rest, "no_frame", code=BAD_INPUT)
+    assert "no_frame.nml:1: 'start_from' in &scene: film has no frame 999" in message, message
+
+
+def conditions_end_stages_alike_everywhere(case, seeds=2):
+    """Finds decisions that depend on ranks, threads, finders or restarts."""
+    for seed in range(1, seeds + 1):
+        text = whole([CONDITIONS], seed=seed)
+        output = case.run(text, f"seed_{seed}")
+        starts = starts_of(output)
+        assert len(starts) == 5, output
+        others = [{"threads": 2}, {"threads": 3}, *({"ranks": ranks} for ranks in (1, 2, 3) if case.parallel)]
+        for k, how in enumerate(others):
+            finder = "neighbours.finder=" + ("quadtree", "verlet")[k % 2]
+            told = case.run(text, f"seed_{seed}_{k}", "--set", finder, **how)
+            assert starts_of(told) == starts and hash_of(told) == hash_of(output), how
+
+
+def a_run_goes_on_in_its_stage(case, kills=12):
+    """Finds state of a stage that no checkpoint holds. The unit tests try the steps of a change one by one."""
+    text = whole([CONDITIONS])
+    expected = hash_of(case.run(text, "straight"))
+    chance = random.Random(1)
+    for _ in range(kills):
+        process = case.start(text, "killed", "--continue", "--set", "checkpoint.steps=20",
+                             threads=chance.choice((1, 2)))
+        time.sleep(chance.uniform(0.02, 0.3))
+        process.send_signal(chance.choice((signal.SIGKILL, signal.SIGTERM)))
+        output, message = process.communicate()
+        assert process.returncode in (0, 75, -signal.SIGKILL, -signal.SIGTERM), message
+    output = case.run(text, "killed", "--continue")
+    assert hash_of(output) == expected, output
+    told = subprocess.run([case.program, "info", "--check", "killed"], capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stdout
+
+
+def more_stages_make_a_finished_run_longer(case):
+    one = hash_of(case.run(whole(STAGES), "three"))
+    steady = "&motion name = 'steady' wall = 'right' kind = 'translation' velocity = 1e-3, 0 /\n"
+    case.run(whole(STAGES[:2]), "grown")
+    message = case.run(whole([*STAGES[:2], STAGES[2]]), "grown", "--continue", code=BAD_INPUT)
+    assert "motion.shift.kind was not used" in message, message
+    assert hash_of(case.run(whole(STAGES), "grown", "--continue", "--changed")) == one
+    # A stage alone needs no --changed.
+    last = "&stage name = 'still' duration = 1e-3 /\n"
+    case.run(whole([*STAGES, last, steady]), "four")
+    case.run(whole([*STAGES, steady]), "alone")
+    output = case.run(whole([*STAGES, last, steady]), "alone", "--continue")
+    assert "extended   stage.name was" in output, output
+    assert hash_of(output) == hash_of(case.run(whole([*STAGES, last, steady]), "four", "--force"))
+
+
+def a_stage_that_lasts_too_long_stops_the_run(case):
+    text = whole(["&stage name = 'rest' until = 'kinetic' below = 1e-9 longest = {longest} {more} /\n"])
+    short = text.format(longest="2e-3", more="")
+    message = case.run(short, "stuck", code=FAILED)
+    assert re.search("stuck.nml:8: stage rest has lasted 2.0.*s, but kinetic is [1-9].*, not below 1.000E-09", message)
+    assert case.run(short, "stuck", "--continue", code=FAILED) == message
+    case.run(text.format(longest="3e-3", more="check = 10"), "stuck", "--continue", "--changed", code=FAILED)
+    output = case.run(text.format(longest="4e-3", more="at_limit = 'next'"), "stuck", "--continue", "--changed")
+    assert hash_of(output) == hash_of(case.run(text.format(longest="4e-3", more="at_limit = 'next'"), "free"))
+
+
+def faults_are_named(case):
+    stage = "&stage name = 'one' {} /\n"
+    case.run(whole(STAGES[:1]), "source")
+    scene = "&scene name = 'result' start_from = '{}' /\n"
+    rest = "&forces stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 1e-3", scheme="")
+    for text, words in (
+            (whole([stage.format("until = 'kinetic' longest = 1")]), "needs a limit: give 'below' or 'above'"),
+            (whole([stage.format("until = 'kinetic' longest = 1 below = 1 above = 2")]), "give only one of them"),
+            (whole([stage.format("")]), "'duration' in &stage is required with until = 'duration'"),
+            (whole([stage.format("duration = 1 gravity = 1")]), "needs two numbers"),
+            (whole([stage.format("duration = 1")]).replace("dt =", "duration = 1 dt ="),
+             "cannot be combined with groups"),
+            (whole([stage.format("until = 'count' longest = 1 above = 1 low = 0, 0 high = 0, 1")]),
+             "must exceed 'low'"),
+            (whole([stage.format("until = 'strain' longest = 1 above = 1 wall = 'lid' opposite = 'lid'")]),
+             "must be another wall"),
+            (whole([stage.format("duration = 1"), STAGES[1].replace("stage = 'press'", "stage = 'two'")]),
+             "unknown stage 'two' in &motion"),
+            (whole([]), "'duration' in &integrate is required"),
+            (scene.format("nowhere") + rest, "nowhere holds no checkpoint"),
+            (scene.format("source") + "&wall name = 'lit' outline = 'result' /\n" + rest,
+             "has no wall 'lit'; did you mean"),
+            (scene.format("source") + "&forces friction = 'none' damping = 'none' /\n"
+             + OUTPUT.format(duration="duration = 1e-3", scheme="scheme = 'gear'"), "start from a frame of it"),
+            (scene.format("source") + "&grains name = 'more' region = 'at' at = 0, 1 /\n" + rest,
+             "cannot be combined with name = 'result'"),
+    ):
+        message = case.run(text, "bad", code=BAD_INPUT)
+        assert words in message and "bad.nml" in message, (words, message)
+
+
+TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
+         conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
+         a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
+
+
+def main():
+    program = os.path.abspath(sys.argv[1])
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(work)
+        case = Case(program)
+        for test in TESTS:
+            began = time.monotonic()
+            test(case)
+            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
+            shutil.rmtree("results", ignore_errors=True)
+
+
+if __name__ == "__main__":
+    main()
