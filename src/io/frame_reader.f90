@@ -63,7 +63,7 @@ contains
       !> Names the file and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      integer(ip), allocatable :: id(:), fixed(:), start(:)
+      integer(ip), allocatable :: id(:), fixed(:), start(:), material(:)
       real(dp), allocatable :: shape(:, :), mass(:), inertia(:), position(:, :, :), angle(:, :), velocity(:, :, :), &
          spin(:, :)
       real(wp), allocatable :: corners(:, :)
@@ -78,13 +78,15 @@ contains
       call file%read('/bodies/vertex', shape, error)
       call file%read('/bodies/mass', mass, error)
       call file%read('/bodies/inertia', inertia, error)
+      if (list%has_materials) call file%read('/bodies/material', material, error)
       call file%read('/frames/position', position, error, rows=[row, 1_lp])
       call file%read('/frames/angle', angle, error, rows=[row, 1_lp])
       call file%read('/frames/velocity', velocity, error, rows=[row, 1_lp])
       call file%read('/frames/angular_velocity', spin, error, rows=[row, 1_lp])
       call file%close(error)
       if (allocated(error)) return
-      if (any([size(fixed), size(mass), size(inertia), size(start) - 1, size(position, 2), size(angle, 1), &
+      if (.not. allocated(material)) material = spread(0_ip, 1, size(id))
+      if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1, size(position, 2), size(angle, 1), &
                size(velocity, 2), size(spin, 1)] /= size(id))) then
          call raise(error, input_error, path//': its data sets have different numbers of bodies')
          return
@@ -97,10 +99,11 @@ contains
                             + real(position(:, k, 1), wp)
          end do
          if (fixed(k) == 1_ip) then
-            call list%append(corners, fixed=.true., id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp))
+            call list%append(corners, fixed=.true., id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp), &
+                             material=material(k))
          else
             call list%append(corners, velocity=real(velocity(:, k, 1), wp), angular_velocity=real(spin(k, 1), wp), &
-                             id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp))
+                             id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp), material=material(k))
          end if
       end do
    end subroutine list_frame

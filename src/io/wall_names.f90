@@ -1,4 +1,5 @@
-!> The names of walls in the files of a result, a text of the provenance: 'floor 101-103; lid 104 107'.
+!> The names of walls and materials in the files of a result, texts of the provenance: 'floor 101-103; lid 104 107' and
+!> 'glass steel'.
 module polydem_wall_names
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
@@ -7,7 +8,7 @@ module polydem_wall_names
    use polydem_wall_bodies, only: wall_bodies_t
    implicit none
    private
-   public :: wall_names_text, find_wall_names
+   public :: wall_names_text, find_wall_names, find_material_names
 
 contains
 
@@ -46,17 +47,12 @@ contains
       !> The walls; none if the result has no names
       type(wall_bodies_t), allocatable, intent(out) :: walls(:)
       type(error_t), allocatable, intent(inout) :: error
-      type(hdf5_file_t) :: file
       character(len=:), allocatable :: text
       type(wall_bodies_t) :: wall
       integer :: last
 
       allocate (walls(0))
-      call file%open(path, error)
-      if (allocated(error)) return
-      text = ''
-      if (file%has('/provenance/walls', error)) call file%read('/provenance/walls', text, error)
-      call file%close(error)
+      call find_text(path, '/provenance/walls', text, error)
       if (allocated(error)) return
       do while (text /= '')
          last = index(text//';', ';') - 1
@@ -65,6 +61,31 @@ contains
          text = trim(adjustl(text(min(last + 2, len(text) + 1):)))
       end do
    end subroutine find_wall_names
+
+   !> Find the names of the materials of a result.
+   subroutine find_material_names(path, text, error)
+      !> A file of the result
+      character(len=*), intent(in) :: path
+      !> The names, separated by blanks; empty if there are none
+      character(len=:), allocatable, intent(out) :: text
+      type(error_t), allocatable, intent(inout) :: error
+
+      call find_text(path, '/provenance/materials', text, error)
+   end subroutine find_material_names
+
+   !> Read a text; it is empty if the file does not have it.
+   subroutine find_text(path, name, text, error)
+      character(len=*), intent(in) :: path, name
+      character(len=:), allocatable, intent(out) :: text
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+
+      text = ''
+      call file%open(path, error)
+      if (allocated(error)) return
+      if (file%has(name, error)) call file%read(name, text, error)
+      call file%close(error)
+   end subroutine find_text
 
    !> Read the name and the identifiers of a wall.
    subroutine read_wall(text, wall)

@@ -20,6 +20,7 @@ module polydem_prepare
    use polydem_settings, only: settings_t
    use polydem_start, only: build_start, recall
    use polydem_start_from, only: find_origin, origin_t
+   use polydem_start_materials, only: material_names_text
    use polydem_wall_names, only: wall_names_text
    implicit none
    private
@@ -102,6 +103,7 @@ contains
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', run%scene_hash)
       call run%provenance%set('walls', wall_names_text(run%simulation%named_walls))
+      if (size(settings%material) > 0) call run%provenance%set('materials', material_names_text(settings))
       if (settings%scene%bodies_file /= '') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return
       run%provenance%processes = run%comm%size

@@ -20,9 +20,10 @@ module polydem_start_from
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
+   use polydem_start_materials, only: translate_materials
    use polydem_strings, only: quoted, suggestion, to_text
    use polydem_wall_bodies, only: wall_bodies_t
-   use polydem_wall_names, only: find_wall_names
+   use polydem_wall_names, only: find_material_names, find_wall_names
    implicit none
    private
    public :: origin_t, find_origin, read_start, recall_history, return_to_state
@@ -118,15 +119,19 @@ contains
       type(origin_t) :: origin
       type(checkpoint_file_t) :: file
       type(body_list_t) :: list
+      character(len=:), allocatable :: materials
       integer(ip) :: s
 
       allocate (named(0))
       call find_origin(settings, origin, error)
+      if (.not. allocated(error)) call find_material_names(origin%path, materials, error)
       call comm%all_reduce_error(error)
       if (allocated(error)) return
+      if (materials /= '') allocate (bodies%material(0))
       if (origin%is_frame) then
          list%rank = comm%rank
          list%n_ranks = comm%size
+         list%has_materials = materials /= ''
          call list_frame(origin%path, origin%row, list, error)
          if (.not. allocated(error)) call new_bodies(list, bodies, error)
       else
@@ -136,6 +141,10 @@ contains
          call read_bodies(file, comm, bodies)
          call file%close(error)
          if (.not. allocated(error)) call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
+      end if
+      if (.not. allocated(error)) then
+         call translate_materials(settings, materials, bodies, error)
+         if (allocated(error)) call blame(settings, error)
       end if
       if (.not. allocated(error)) call name_walls(settings, origin%path, named, error)
       call comm%all_reduce_error(error)
