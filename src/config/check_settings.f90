@@ -151,7 +151,7 @@ contains
             'must be positive along each periodic axis; for example size = 0.4, 0.4', error)
       end do
       associate (scene => instances(index_of_instance(instances, 'scene')))
-         if (.not. any(settings%scene%name == [character(len=5) :: 'parts', 'file'])) call blame(scene, 'name', &
+         if (all(settings%scene%name /= [character(len=6) :: 'parts', 'file', 'result'])) call blame(scene, 'name', &
             'must be left out in a periodic cell, since recipes have walls around the grains; start from the '// &
             'groups &grains and &wall that check --expand prints, without these walls', error)
          if (settings%scene%motion == 'rotation') call blame(scene, 'motion', no_rotation, error)

@@ -86,8 +86,8 @@ contains
       call file%close(error)
       if (allocated(error)) return
       if (.not. allocated(material)) material = spread(0_ip, 1, size(id))
-      if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1, size(position, 2), size(angle, 1), &
-               size(velocity, 2), size(spin, 1)] /= size(id))) then
+      if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1, size(position, 2), &
+               size(angle, 1), size(velocity, 2), size(spin, 1)] /= size(id))) then
          call raise(error, input_error, path//': its data sets have different numbers of bodies')
          return
       end if
