@@ -70,6 +70,8 @@ module polydem_bodies
       !> In a periodic cell the number of cells that each body has crossed along each axis: without the cell its centre
       !> would be at `position + image*cell%size`, (slot, x or y)
       integer(ip), allocatable :: image(:, :)
+      !> In a sheared cell what `image` lacks: sum of the shifts of the borders that each body has crossed, (slot) [m]
+      real(wp), allocatable :: slid(:)
       !> In a periodic cell 1/size for each body and axis, 0 along axes along which it does not repeat, (2, slot) [1/m]
       real(wp), allocatable :: folds(:, :)
       !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`

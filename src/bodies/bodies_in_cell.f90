@@ -20,6 +20,7 @@ contains
 
       bodies%cell = cell
       if (cell%is_periodic .and. .not. allocated(bodies%image)) allocate (bodies%image(bodies%n, 2), source=0_ip)
+      if (cell%is_sheared .and. .not. allocated(bodies%slid)) allocate (bodies%slid(bodies%n), source=0.0_wp)
    end subroutine set_cell
 
    !> Find out along which axes bodies repeat.
@@ -50,14 +51,15 @@ contains
 
    !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
    pure subroutine wrap_bodies(bodies, slots)
-      !> Bodies at the end of a step; `position` and `image` change
+      !> Bodies at the end of a step; `position` and `image` change, in a sheared cell also `velocity` and `slid`
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in), contiguous :: slots(:)
       integer(ip) :: k, crossed
       integer :: axis
 
-      do axis = 1, 2
+      ! The border that is crossed along y decides on the place along x.
+      do axis = 2, 1, -1
          associate (low => bodies%cell%low(axis), side => bodies%cell%size(axis))
             if (.not. side > 0.0_wp) cycle
             do k = 1_ip, size(slots, kind=ip)
@@ -65,11 +67,28 @@ contains
                   crossed = merge(1_ip, 0_ip, x >= low + side) - merge(1_ip, 0_ip, x < low)
                   x = x - real(crossed, wp)*side
                   image = image + crossed
+                  if (crossed /= 0_ip .and. axis == 2 .and. bodies%cell%is_sheared) &
+                     call cross_sheared_border(bodies, slots(k), crossed)
                end associate
             end do
          end associate
       end do
    end subroutine wrap_bodies
+
+   !> Move a body that crosses the upper or lower border of a sheared cell to the place and velocity of its copy.
+   pure subroutine cross_sheared_border(bodies, s, crossed)
+      type(bodies_t), intent(inout) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> 1 if it crosses the upper border, -1 if it crosses the lower one
+      integer(ip), intent(in) :: crossed
+
+      associate (cell => bodies%cell, times => real(crossed, wp))
+         bodies%position(1, s) = bodies%position(1, s) - times*cell%former_shift
+         bodies%velocity(1, s) = bodies%velocity(1, s) - times*cell%former_jump
+         bodies%slid(s) = bodies%slid(s) + times*cell%former_shift
+      end associate
+   end subroutine cross_sheared_border
 
    !> Put bodies that may be anywhere into the cell. Those that span it stay where they are.
    pure subroutine put_into_cell(bodies, slots)

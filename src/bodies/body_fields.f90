@@ -21,6 +21,8 @@ contains
          call serializer%field('/bodies/image_x', bodies%image(:, 1), '1', 'cells crossed along x')
          call serializer%field('/bodies/image_y', bodies%image(:, 2), '1', 'cells crossed along y')
       end if
+      if (allocated(bodies%slid)) call serializer%field('/bodies/slid', bodies%slid, 'm', &
+                                                        'shifts of the crossed borders of a sheared cell')
       call serializer%field('/bodies/angle', bodies%angle, 'rad', 'angles since the start')
       call serializer%field('/bodies/velocity', bodies%velocity, 'm/s', 'velocities of the centres of mass')
       call serializer%field('/bodies/angular_velocity', bodies%angular_velocity, 'rad/s', 'angular velocities')

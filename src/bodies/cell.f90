@@ -2,11 +2,14 @@
 !>
 !> Every body has one place in the cell, and every pair of bodies one vector, that to the nearest copy. No contact is
 !> missed as long as half the cell is longer than two bodies reach together; then at most one copy of a body can touch.
+!>
+!> In a *sheared* cell the copies above and below move along x, the upper one by `shift` with the velocity `jump`
+!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time.
 module polydem_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: cell_t, new_cell, nearest_copy, fold_offsets
+   public :: cell_t, new_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y
 
    !> Periodic cell
    type :: cell_t
@@ -18,19 +21,29 @@ module polydem_cell
       real(wp) :: size(2) = 0.0_wp
       !> 1/size; 0 along an axis that is not periodic [1/m]
       real(wp) :: inverse(2) = 0.0_wp
+      !> Whether the cell is sheared
+      logical :: is_sheared = .false.
+      !> Rate of the shear [1/s], and time in which it smoothly reaches this rate [s]
+      real(wp) :: rate = 0.0_wp, ramp = 0.0_wp
+      !> Displacement of the copy above, from 0 to the width [m], and its velocity [m/s]
+      real(wp) :: shift = 0.0_wp, jump = 0.0_wp
+      !> Both at the start of the step
+      real(wp) :: former_shift = 0.0_wp, former_jump = 0.0_wp
    end type cell_t
 
-   !> A number of such size that adding it rounds to integers: the bits are the same with every instruction set
+   !> A number of such size that adding it rounds to whole numbers
    real(wp), parameter :: rounder = 1.5_wp*2.0_wp**(digits(1.0_wp) - 1)
 
 contains
 
    !> A cell that is periodic along some axes
-   pure function new_cell(axes, low, size) result(cell)
+   pure function new_cell(axes, low, size, rate, ramp) result(cell)
       !> 'none', 'x', 'y' or 'xy'
       character(len=*), intent(in) :: axes
       !> Lower left corner, and width and height; only those along periodic axes are used [m]
       real(wp), intent(in) :: low(2), size(2)
+      !> Rate of the shear, 0 if there is none [1/s], and its ramp [s]
+      real(wp), intent(in) :: rate, ramp
       type(cell_t) :: cell
       integer :: axis
 
@@ -41,19 +54,74 @@ contains
          cell%size(axis) = size(axis)
          cell%inverse(axis) = 1.0_wp/size(axis)
       end do
+      cell%is_sheared = abs(rate) > 0.0_wp
+      cell%rate = rate
+      cell%ramp = ramp
+      call shear_cell(cell, 0.0_wp, 0.0_wp)
    end function new_cell
 
-   !> A distance along an axis to the nearest copy of where it leads [m]
-   elemental real(wp) function nearest_copy(distance, fold, size)
-      !> Distance [m]
-      real(wp), intent(in) :: distance
-      !> 1 over the side of the cell, or 0 if the distance is not folded [1/m]
-      real(wp), intent(in) :: fold
-      !> Side of the cell [m]
-      real(wp), intent(in) :: size
+   !> Shear the cell for a step. Nothing is done if it is not sheared.
+   elemental subroutine shear_cell(cell, from, to)
+      type(cell_t), intent(inout) :: cell
+      !> Simulated time at the start and at the end of the step [s]
+      real(wp), intent(in) :: from, to
 
-      nearest_copy = distance - ((distance*fold + rounder) - rounder)*size
+      if (.not. cell%is_sheared) return
+      call find_shear(cell, from, cell%former_shift, cell%former_jump)
+      call find_shear(cell, to, cell%shift, cell%jump)
+   end subroutine shear_cell
+
+   !> Find displacement and velocity of the copy above at a time. During the ramp the rate rises as u^2 (3 - 2 u), as
+   !> that of prescribed motions.
+   elemental subroutine find_shear(cell, time, shift, jump)
+      type(cell_t), intent(in) :: cell
+      !> Simulated time [s]
+      real(wp), intent(in) :: time
+      !> Displacement [m] and velocity [m/s]
+      real(wp), intent(out) :: shift, jump
+      real(wp) :: elapsed, factor, u
+
+      elapsed = time - 0.5_wp*cell%ramp
+      factor = 1.0_wp
+      if (time < cell%ramp) then
+         u = time/cell%ramp
+         elapsed = cell%ramp*u*u*u*(1.0_wp - 0.5_wp*u)
+         factor = u*u*(3.0_wp - 2.0_wp*u)
+      end if
+      jump = cell%rate*cell%size(2)*factor
+      shift = modulo(cell%rate*cell%size(2)*elapsed, cell%size(1))
+   end subroutine find_shear
+
+   !> The vector to the nearest copy of where a vector leads [m]
+   pure function nearest_copy(cell, folds, vector) result(nearest)
+      type(cell_t), intent(in) :: cell
+      !> 1/size along both axes, or 0 if the vector is not folded [1/m]
+      real(wp), intent(in) :: folds(2)
+      !> The vector [m]
+      real(wp), intent(in) :: vector(2)
+      real(wp) :: nearest(2), copies
+
+      copies = rounded(vector(2)*folds(2))
+      nearest(2) = vector(2) - copies*cell%size(2)
+      nearest(1) = vector(1) - copies*cell%shift
+      nearest(1) = nearest(1) - rounded(nearest(1)*folds(1))*cell%size(1)
    end function nearest_copy
+
+   !> Number of cells along y to the copy from which a distance leads to the nearest one
+   elemental real(wp) function copies_along_y(cell, distance)
+      type(cell_t), intent(in) :: cell
+      !> Distance along y [m]
+      real(wp), intent(in) :: distance
+
+      copies_along_y = rounded(distance*cell%inverse(2))
+   end function copies_along_y
+
+   !> The nearest whole number; the bits are the same with every instruction set
+   elemental real(wp) function rounded(number)
+      real(wp), intent(in) :: number
+
+      rounded = (number + rounder) - rounder
+   end function rounded
 
    !> Replace the vectors between the bodies of some pairs by those to the nearest copies.
    pure subroutine fold_offsets(cell, n, first, second, folds, offset)
@@ -67,7 +135,7 @@ contains
       integer(ip) :: c
 
       do c = 1_ip, n
-         offset(c, :) = nearest_copy(offset(c, :), min(folds(:, first(c)), folds(:, second(c))), cell%size)
+         offset(c, :) = nearest_copy(cell, min(folds(:, first(c)), folds(:, second(c))), offset(c, :))
       end do
    end subroutine fold_offsets
 

@@ -1,18 +1,21 @@
 !> Terms of the contacts between fixed and free bodies, for the energy balance and for forces on walls.
 module polydem_wall_terms
    use polydem_bodies, only: bodies_t
+   use polydem_cell, only: copies_along_y
    use polydem_contact_block, only: block_size, contact_block_t, load_block
    use polydem_contacts, only: contacts_t
    use polydem_force_sums, only: append_term, contact_terms_t, reserve_terms, term_list_t, term_of, terms_of_block
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: wall_terms_t, append_walls, join_walls, select_walls
+   public :: wall_terms_t, append_walls, append_border, join_walls, select_walls
 
    !> Terms of the fixed bodies of contacts, in descending order of the contacts. The partners are the free bodies
    type, extends(term_list_t) :: wall_terms_t
       !> Whether the elastic force has an energy (see `contacts_t`)
       logical :: energy_is_known = .false.
+      !> In a sheared cell the terms of bodies in contacts across the upper border, with the copies of their partners
+      type(term_list_t) :: border
    end type wall_terms_t
 
 contains
@@ -42,6 +45,26 @@ contains
       end do
    end subroutine append_walls
 
+   !> Append the contacts of a block across the upper or lower border of a sheared cell to a list.
+   pure subroutine append_border(bodies, block, terms, border)
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      type(contact_terms_t), intent(in) :: terms
+      !> Terms of the upper body of each contact in the cell, whose partner is a copy from below it
+      type(term_list_t), intent(inout) :: border
+      real(wp) :: copies
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         associate (i => block%first(c), j => block%second(c))
+            copies = copies_along_y(bodies%cell, bodies%position(2, j) - bodies%position(2, i))
+            if (.not. abs(copies) > 0.0_wp) cycle
+            call reserve_terms(border%n + 1_ip, border)
+            call append_term(merge([i, j], [j, i], copies > 0.0_wp), term_of(terms, c, copies > 0.0_wp), border)
+         end associate
+      end do
+   end subroutine append_border
+
    !> Join the contacts of several ranges of pairs.
    pure subroutine join_walls(ranges, walls)
       !> Those of each range, in ascending order of the ranges
@@ -51,16 +74,28 @@ contains
       integer :: r
 
       walls%n = 0_ip
+      walls%border%n = 0_ip
       call reserve_terms(sum(ranges%n), walls%term_list_t)
       do r = size(ranges), 1, -1
-         associate (n => ranges(r)%n, low => walls%n + 1_ip)
-            if (n == 0_ip) cycle
-            walls%slots(:, low:low + n - 1_ip) = ranges(r)%slots(:, :n)
-            walls%term(:, low:low + n - 1_ip) = ranges(r)%term(:, :n)
-            walls%n = walls%n + n
-         end associate
+         call append_list(ranges(r)%term_list_t, walls%term_list_t)
+         if (ranges(r)%border%n == 0_ip) cycle
+         call reserve_terms(walls%border%n + ranges(r)%border%n, walls%border)
+         call append_list(ranges(r)%border, walls%border)
       end do
    end subroutine join_walls
+
+   !> Append a list to another one that has room for it.
+   pure subroutine append_list(list, all_of_them)
+      type(term_list_t), intent(in) :: list
+      type(term_list_t), intent(inout) :: all_of_them
+
+      associate (n => list%n, low => all_of_them%n + 1_ip)
+         if (n == 0_ip) return
+         all_of_them%slots(:, low:low + n - 1_ip) = list%slots(:, :n)
+         all_of_them%term(:, low:low + n - 1_ip) = list%term(:, :n)
+         all_of_them%n = all_of_them%n + n
+      end associate
+   end subroutine append_list
 
    !> Select the contacts with fixed bodies from a table.
    subroutine select_walls(bodies, contacts, walls)

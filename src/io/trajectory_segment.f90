@@ -3,7 +3,7 @@
 !>     /bodies      id, fixed, mass, inertia, vertex_start, vertex: the bodies, in ascending order of identifiers
 !>     /cell        low, size: periodic cell (in a periodic cell)
 !>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
-!>                  image (in a periodic cell)
+!>                  image (in a periodic cell), slid and shift (in a sheared cell)
 !>     /walls       id; force and torque on the fixed bodies: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
 !>                  normal, force: one row per contact (optional)
@@ -183,6 +183,12 @@ contains
       call blocks%to_blocks(comm, transpose(int(bodies%image, lp)), images)
       call file%write('/frames/image', int(images, ip), error, '1', &
                       'cells crossed: position + image*size is the path without the cell', part, rows=one_row)
+      if (.not. allocated(bodies%slid)) return
+      call blocks%to_blocks(comm, reshape(real(bodies%slid, dp), [1_ip, bodies%n]), block)
+      call file%write('/frames/slid', component(block, 1), error, 'm', &
+                      'shifts of the crossed borders, to be added to this path along x', part, rows=one_row)
+      call file%write('/frames/shift', real(bodies%cell%shift, dp), error, 'm', &
+                      'displacement of the copy of the cell above along x', rows=one_row)
    end subroutine add_frame
 
    !> Add the forces and torques on the fixed bodies, if there are any.

@@ -185,14 +185,15 @@ contains
       real(wp), intent(in) :: radius(:)
       !> Slots of the body and of the other body
       integer(ip), intent(in) :: s, other
-      real(wp) :: x, y, cross
+      real(wp) :: x, y, cross, offset(2)
       integer(ip) :: v, w
 
       x = bodies%position(1, s) - bodies%position(1, other)
       y = bodies%position(2, s) - bodies%position(2, other)
       if (bodies%cell%is_periodic) then
-         x = nearest_copy(x, min(bodies%folds(1, s), bodies%folds(1, other)), bodies%cell%size(1))
-         y = nearest_copy(y, min(bodies%folds(2, s), bodies%folds(2, other)), bodies%cell%size(2))
+         offset = nearest_copy(bodies%cell, min(bodies%folds(:, s), bodies%folds(:, other)), [x, y])
+         x = offset(1)
+         y = offset(2)
       end if
       centre_inside = x*x + y*y < radius(other)*radius(other)
       if (.not. centre_inside) return

@@ -22,7 +22,7 @@ module polydem_contact_walk
    use polydem_timers, only: block_clock_t
    use polydem_walk_results, only: range_results_t, walk_results_t
    use polydem_wall_shares, only: find_shares, set_shares
-   use polydem_wall_terms, only: append_walls, join_walls
+   use polydem_wall_terms, only: append_border, append_walls, join_walls
    implicit none
    private
    public :: walk_contacts
@@ -154,6 +154,7 @@ contains
       call start_rows(contacts, merge(walk%ranges(r)%n_contacts, 0_ip, walk%has_table), walk%all_of(r))
       call start_rows(contacts, 0_ip, walk%flagged_of(r))
       walk%walls_of(r)%n = 0_ip
+      walk%walls_of(r)%border%n = 0_ip
       associate (results => walk%ranges(r))
          results%late%n = 0_ip
          results%n_contacts = 0_ip
@@ -175,6 +176,7 @@ contains
          call count_block(self, block, walk%ranges(r))
          if (walk%has_table) call append_rows(block, walk%all_of(r), with_forces=.true.)
          call append_walls(self%bodies%fixed, block, terms, walk%walls_of(r))
+         if (self%bodies%cell%is_sheared) call append_border(self%bodies, block, terms, walk%walls_of(r)%border)
          call test_block(walk%flag_limits, self%bodies, block, self%history, suspect, some, &
                          walk%ranges(r)%passing_pair)
          if (some) call append_rows(block, walk%flagged_of(r), with_forces=.true., chosen=suspect)

@@ -11,7 +11,7 @@ module polydem_enter_cell
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: enter_cell
+   public :: enter_cell, check_constraint
 
    !> Names of the axes
    character(len=1), parameter :: name(2) = ['x', 'y']
@@ -30,7 +30,8 @@ contains
 
       if (self%settings%cell%periodic == 'none') return
       associate (bodies => self%bodies, settings => self%settings)
-         call set_cell(bodies, new_cell(settings%cell%periodic, settings%cell%low, settings%cell%size))
+         call set_cell(bodies, new_cell(settings%cell%periodic, settings%cell%low, settings%cell%size, &
+                                       settings%cell%shear_rate, settings%cell%shear_ramp))
          call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
          call find_folds(bodies)
          largest = 0.0_wp
@@ -52,11 +53,29 @@ contains
          do s = 1_ip, bodies%n
             if (bodies%fixed(s)) bodies%image(s, :) = 0_ip
          end do
+         if (settings%cell%profile) then
+            do s = 1_ip, bodies%n
+               bodies%velocity(1, s) = bodies%velocity(1, s) + bodies%cell%rate* &
+                  (bodies%position(2, s) - (bodies%cell%low(2) + 0.5_wp*bodies%cell%size(2)))
+            end do
+         end if
          do s = 1_ip, size(self%walls, kind=ip)
             self%walls(s)%position = bodies%position(:, self%walls(s)%slots)
          end do
       end associate
    end subroutine enter_cell
+
+   !> Check that no constraint on velocities acts in a sheared cell.
+   subroutine check_constraint(self, error)
+      !> The simulation with its force law
+      type(simulation_t), intent(in) :: self
+      !> Allocated if there is one
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (self%bodies%cell%is_sheared .and. allocated(self%law%constraint)) call raise(error, input_error, &
+         place_of(self%settings, 'cell', 'shear_rate')//': ''shear_rate'' in &cell cannot be combined with this '// &
+         '''friction'' in &forces, which does not know the velocity of the border; use cundall_strack')
+   end subroutine check_constraint
 
    !> Add up the bodies of all ranks that were outside. Collective.
    subroutine reduce_count(self)
@@ -80,6 +99,12 @@ contains
       integer :: axis
 
       associate (bodies => self%bodies, cell => self%bodies%cell)
+         if (bodies%fixed(s) .and. cell%is_sheared) then
+            call raise(error, input_error, place_of(self%settings, 'cell', 'shear_rate')//': ''shear_rate'' in '// &
+               '&cell: body '//to_text(bodies%id(s))//' is fixed, but a sheared cell can have no fixed bodies')
+            error%place = int(bodies%global_index(s), lp)
+            return
+         end if
          do axis = 1, 2
             if (.not. cell%size(axis) > 0.0_wp) cycle
             if (.not. bodies%fixed(s)) then

@@ -5,7 +5,6 @@
 !> most of the memory that a step of a large dilute scene reads and writes. With gravity a step leaves nothing out.
 module polydem_free_flight
    use polydem_bodies, only: block_size, bodies_t, turn_bodies
-   use polydem_bodies_in_cell, only: wrap_bodies
    use polydem_body_runs, only: find_run, list_others
    use polydem_box_maker, only: box_maker_t, turn_and_bound_block, turn_and_bound_in_cell
    use polydem_boxes, only: boxes_t
@@ -92,8 +91,8 @@ contains
       self%is_dilute = self%is_weightless .and. pairs%n_paired <= n/dilution
    end subroutine begin_step
 
-   !> Predict up to `block_size` bodies; those that have coasted only drift. Those that have left a periodic cell return
-   !> to it first. Several threads may call it for different bodies.
+   !> Predict up to `block_size` bodies; those that have coasted only drift. Several threads may call it for different
+   !> bodies.
    subroutine predict(self, integrator, check, dt, slots, bodies)
       class(free_flight_t), intent(inout) :: self
       class(integrator_t), intent(inout) :: integrator
@@ -106,7 +105,6 @@ contains
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: n, next, first, last, others(block_size)
 
-      if (bodies%cell%is_periodic) call wrap_bodies(bodies, slots)
       if (.not. self%skips_coasting) then
          next = 1_ip
          do while (next <= size(slots, kind=ip))

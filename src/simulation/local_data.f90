@@ -37,12 +37,15 @@ contains
       if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
+      self%walk%walls%border%n = 0_ip
       self%walk%walls%energy_is_known = self%law%energy_is_known
       call fit_table(self%law, self%walk%flagged)
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
-      call self%flight%start(self%settings%forces%gravity, allocated(self%body_forces%list), self%integrator, &
+      ! The border of a sheared cell acts on bodies that nothing touches.
+      call self%flight%start(self%settings%forces%gravity, &
+                             allocated(self%body_forces%list) .or. self%bodies%cell%is_sheared, self%integrator, &
                              self%bodies%n)
       self%walk%incidence = incidence_t()
       call list_moving(self)

@@ -237,7 +237,8 @@ contains
       integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
       integer(ip) :: s, n
 
-      call self%domain%rank_bounds%publish(self%comm, own%boxes, self%domain%period)
+      call self%domain%rank_bounds%publish(self%comm, own%boxes, self%domain%period, &
+                                           self%bodies%cell%is_sheared)
       call list_needed(self%domain, self%comm, own%boxes, sent, counts)
       sent = own%free(sent)
       call copy_packed(own%bodies, sent, halo)

@@ -8,7 +8,7 @@ module polydem_start_simulation
    use polydem_choose_step, only: choose_step
    use polydem_communicator, only: communicator_t
    use polydem_domain, only: new_domain
-   use polydem_enter_cell, only: enter_cell
+   use polydem_enter_cell, only: check_constraint, enter_cell
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
@@ -72,6 +72,7 @@ contains
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
       call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, self%bodies%cell)
       if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
+      if (.not. allocated(error)) call check_constraint(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call limit_displacement(self)

@@ -1,6 +1,7 @@
 !> The time step of a simulation.
 module polydem_time_step
    use polydem_bodies, only: turn_bodies
+   use polydem_cell, only: shear_cell
    use polydem_box_images, only: place_images
    use polydem_box_maker, only: turn_and_bound
    use polydem_boxes_within, only: have_boxes_within
@@ -12,7 +13,7 @@ module polydem_time_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_prediction, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
-   use polydem_simulation, only: simulation_t, sum_began, sum_ended
+   use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
    use polydem_strings, only: to_text
    use polydem_timers, only: block_clock_t, stage_boxes, stage_decomposition, stage_forces, stage_integrate, &
       stage_neighbours, stage_overlap
@@ -36,6 +37,7 @@ contains
 
       self%step = self%step + 1_lp
       call begin_step(self%energy_balance)
+      call shear_cell(self%bodies%cell, real(self%step - 1_lp, wp)*self%dt, time_of(self))
       associate (timers => self%timers, domain => self%domain)
          call timers%start()
          if (domain%has_halo()) then
@@ -85,7 +87,7 @@ contains
       if (allocated(error)) return
       call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%boxes)
       if (.not. self%bodies%cell%is_periodic) return
-      call place_images(self%maker%images, self%boxes)
+      call place_images(self%maker%images, self%bodies%cell, self%boxes)
       if (.not. allocated(self%domain%reference)) return
       do k = 1, size(self%walls)
          has_left = has_left .or. .not. have_boxes_within(self%maker, self%walls(k)%slots, self%boxes, &

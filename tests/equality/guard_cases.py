@@ -102,7 +102,8 @@ VARIED = {
     "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
-    "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6", "wall.one.corners": "6",
+    "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
+    "cell.shear_rate": None, "cell.shear_ramp": None, "wall.one.corners": "6",
     "motion.one.stage": None, "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
     "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
@@ -146,7 +147,8 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
              **dict.fromkeys(("motion.one.stage", "scene.start_from", "stage.one.wall", "stage.one.opposite"),
                              "check_stages.py"),
-             "wall.one.bodies": "as motion.one.bodies", "grains.one.packing": "as scene.packing",
+             "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
+             "cell.shear_ramp": "as cell.shear_rate", "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 

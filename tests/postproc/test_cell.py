@@ -68,3 +68,18 @@ def test_pictures_show_the_cell_with_copies_at_its_border(trajectory):
 def test_a_film_of_a_cell(trajectory, tmp_path):
     make_movie(trajectory, [0, 1, 2], tmp_path / "cell.gif", Look(show=("forces",)), size=(200, 160))
     assert (tmp_path / "cell.gif").stat().st_size > 1000
+
+
+def test_paths_and_arms_in_a_sheared_cell(tmp_path):
+    text = SCENE.replace("periodic = 'xy'", "periodic = 'xy' shear_rate = -30 profile = .true.")
+    (tmp_path / "shear.nml").write_text(text.format(folder=tmp_path / "result"), encoding="utf-8")
+    subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", tmp_path / "shear.nml"], check=True, stdout=subprocess.PIPE)
+    run = Trajectory(tmp_path / "result")
+    assert np.abs(np.diff(run.series("unwrapped"), axis=0)).max() < 0.02
+    assert np.ptp(run.series("unwrapped")[-1, :, 0]) > 0.1
+    assert len({frame.shift for frame in run}) > 10
+    assert len(run[-1].shifts) == 10
+    for frame in run:
+        contacts = frame.contacts
+        for index, arm in ((contacts.first_index, contacts.first_arm), (contacts.second_index, contacts.second_arm)):
+            assert np.all(np.hypot(*arm.T) <= frame.radius[index] + 1e-12)

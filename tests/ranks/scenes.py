@@ -71,6 +71,14 @@ SCENES = {
 &forces gravity = 0, 0 stiffness = 2e5 /
 &integrate safety_factor = 0.1 duration = 0.03 /
 """,
+    # The same, sheared: the cell's copies above and below slide past it several times.
+    "shear": """\
+&cell periodic = 'xy' low = -0.05, -0.03 size = 0.1, 0.1 shear_rate = 100 shear_ramp = 0.01 profile = .true. /
+&grains name = 'sample' region = 'box' low = -0.05, -0.03 high = 0.05, 0.07 number = 70 arrangement = 'spread'
+   speed = 1 spin = 50 momentum = 'zero' /
+&forces gravity = 0, 0 stiffness = 1e6 /
+&integrate safety_factor = 0.1 duration = 0.02 /
+""",
     # A chute: grains slide over a rough base that moves itself, and a shaking floor that spans the cell.
     "chute": """\
 &cell periodic = 'x' low = 0.1, 0 size = 0.2, 0 /

@@ -7,7 +7,7 @@
 module polydem_body_contributions
    use polydem_bodies, only: bodies_t
    use polydem_force_sums, only: force_sums_t, n_terms, of_elastic, of_normal, of_tangential, sum_energy, sum_torque, &
-      sum_x, sum_y
+      sum_x, sum_y, term_list_t
    use polydem_kinds, only: ip, wp
    use polydem_wall_terms, only: wall_terms_t
    implicit none
@@ -185,7 +185,45 @@ contains
             if (present(energy)) energy(body) = energy(body) + walls%term(sum_energy, c)
          end associate
       end do
+      if (walls%border%n > 0_ip) call add_border(bodies%cell%jump, walls%border, weight, first, last, channels, &
+                                                 wall_channels)
    end subroutine add_walls
+
+   !> Add the work of the border of a sheared cell on some bodies to the channels. The upper body of a contact meets a
+   !> copy that moves with the jump of the border relative to its partner. Half of the power of this velocity belongs to
+   !> each body of the contact, so that either of two ranks adds its own half.
+   pure subroutine add_border(jump, border, weight, first, last, channels, wall_channels)
+      !> Velocity of the border [m/s]
+      real(wp), intent(in) :: jump
+      !> Terms of the upper bodies
+      type(term_list_t), intent(in) :: border
+      !> Factor of all that is added
+      real(wp), intent(in) :: weight
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Channels of all bodies, (n_channels, slot) [W/m]
+      real(wp), intent(inout) :: channels(:, :)
+      !> Wall channels of all bodies, (n_wall_channels, slot)
+      real(wp), intent(inout) :: wall_channels(:, :)
+      real(wp) :: half, power(n_channels)
+      integer(ip) :: c, s
+      integer :: k
+
+      half = 0.5_wp*weight*jump
+      do c = 1_ip, border%n
+         associate (term => border%term(:, c))
+            power(1) = half*term(sum_x(of_elastic))
+            power(2) = half*(term(sum_x(of_normal)) - term(sum_x(of_elastic)))
+            power(3) = half*term(sum_x(of_tangential))
+         end associate
+         do k = 1, 2
+            s = border%slots(k, c)
+            if (s < first .or. s > last) cycle
+            channels(:, s) = channels(:, s) + power
+            wall_channels(1, s) = wall_channels(1, s) - ((power(1) + power(2)) + power(3))
+         end do
+      end do
+   end subroutine add_border
 
    !> Kinetic energy [J/m], potential energy [J/m], momentum along x and y [N s/m] and angular momentum about the origin
    !> [N s] of a free body; then the sums of the absolute values of its momenta along x and y [N s/m], and of its

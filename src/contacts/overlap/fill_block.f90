@@ -12,7 +12,7 @@
 !> A contact of a batch is never degenerate.
 module polydem_fill_block
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: fold_offsets, nearest_copy
+   use polydem_cell, only: copies_along_y, fold_offsets, nearest_copy
    use polydem_contact_block, only: block_size, contact_block_t, copy_motion
    use polydem_contact_history, only: contact_history_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
@@ -62,6 +62,7 @@ contains
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
       if (.not. all_certified) call search_others(bodies, effective, batch%certified, history, block)
       call copy_motion(bodies, block)
+      if (bodies%cell%is_sheared) call add_jumps(bodies, block)
       call find_rates_and_directions(block)
       if (.not. all_certified) call direct_from_centres(bodies, block)
    end subroutine fill_block
@@ -199,7 +200,7 @@ contains
       offset(1) = bodies%position(1, j) - bodies%position(1, i)
       offset(2) = bodies%position(2, j) - bodies%position(2, i)
       if (bodies%cell%is_periodic) &
-         offset = nearest_copy(offset, min(bodies%folds(:, i), bodies%folds(:, j)), bodies%cell%size)
+         offset = nearest_copy(bodies%cell, min(bodies%folds(:, i), bodies%folds(:, j)), offset)
    end function offset_of
 
    !> Search the overlaps of the pairs that are not certified, and remove those that are no contacts.
@@ -282,6 +283,20 @@ contains
       end do
       block%n = b
    end subroutine remove_others
+
+   !> Add to the velocities of the second bodies those of their nearest copies in a sheared cell.
+   pure subroutine add_jumps(bodies, block)
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(inout) :: block
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         associate (distance => bodies%position(2, block%second(c)) - bodies%position(2, block%first(c)))
+            block%velocity_second(c, 1) = block%velocity_second(c, 1) &
+               - copies_along_y(bodies%cell, distance)*bodies%cell%jump
+         end associate
+      end do
+   end subroutine add_jumps
 
    !> Compute the rates of change of the areas, and find the directions from the second bodies to the first.
    pure subroutine find_rates_and_directions(block)

@@ -7,6 +7,9 @@
 !> Images are chosen when the boxes are made, with room for the distance that boxes may move before they are made
 !> again. A box gets those copies that may meet a box of a body that this rank moves.
 !>
+!> In a sheared cell the copies above and below slide along x. Boxes near these borders have three images there, side by
+!> side, of which the middle one is placed in the cell: they follow the slide without being chosen again.
+!>
 !> Sums of a bound and a side of the cell are rounded. Images, and boxes that are copies themselves, are therefore
 !> widened by a few roundings, so that bodies that touch have boxes that touch.
 module polydem_box_images
@@ -26,8 +29,8 @@ module polydem_box_images
       integer(ip) :: n_before = 0_ip
       !> Box of which each image is a copy; not allocated in the plane
       integer(ip), allocatable :: source(:)
-      !> Vector from the box to its image, (2, image) [m]
-      real(wp), allocatable :: shift(:, :)
+      !> Number of cells along x and y from the box to its image, (2, image)
+      real(wp), allocatable :: copy(:, :)
    end type box_images_t
 
 contains
@@ -61,18 +64,19 @@ contains
                   if (i == 0 .and. j == 0) cycle
                   shift = real([i, j], wp)*cell%size
                   copy = widened(boxes%bounds(:, b) + [shift - room, shift + room], cell%size)
-                  if (any(copy(1:2) > own(3:4)) .or. any(copy(3:4) < own(1:2))) cycle
+                  if (copy(2) > own(4) .or. copy(4) < own(2)) cycle
+                  if (.not. (cell%is_sheared .and. j /= 0) .and. (copy(1) > own(3) .or. copy(3) < own(1))) cycle
                   n = n + 1_ip
                   if (pass == 1_ip) cycle
                   images%source(n) = b
-                  images%shift(:, n) = shift
+                  images%copy(:, n) = real([i, j], wp)
                end do
             end do
          end do
-         if (pass == 1_ip) allocate (images%source(n), images%shift(2, n))
+         if (pass == 1_ip) allocate (images%source(n), images%copy(2, n))
       end do
       call append_images(cell, images, boxes)
-      call place_images(images, boxes)
+      call place_images(images, cell, boxes)
    end subroutine add_images
 
    !> Append boxes for images.
@@ -100,17 +104,23 @@ contains
    end subroutine append_images
 
    !> Update the bounds of all images to those of their boxes. Nothing is done in the plane.
-   pure subroutine place_images(images, boxes)
+   pure subroutine place_images(images, cell, boxes)
       type(box_images_t), intent(in) :: images
+      type(cell_t), intent(in) :: cell
       !> Boxes; only the bounds of images change
       type(boxes_t), intent(inout) :: boxes
+      real(wp) :: shift(2), slide
       integer(ip) :: k
 
       if (.not. allocated(images%source)) return
       do k = 1_ip, size(images%source, kind=ip)
-         associate (shift => images%shift(:, k))
-            boxes%bounds(:, images%n_before + k) = &
-               widened(boxes%bounds(:, images%source(k)) + [shift, shift], abs(shift))
+         associate (copy => images%copy(:, k), source => boxes%bounds(:, images%source(k)))
+            shift = copy*cell%size
+            if (cell%is_sheared .and. abs(copy(2)) > 0.0_wp) then
+               slide = 0.5_wp*(source(1) + source(3)) + copy(2)*cell%shift - cell%low(1)
+               shift(1) = shift(1) + copy(2)*cell%shift - floor(slide*cell%inverse(1))*cell%size(1)
+            end if
+            boxes%bounds(:, images%n_before + k) = widened(source + [shift, shift], abs(shift))
          end associate
       end do
    end subroutine place_images
@@ -127,7 +137,10 @@ contains
       real(wp) :: shift(2)
       integer :: b
 
-      shift = anint((former(1:2) - bounds(1:2, 1))*folds)*cell%size
+      shift(2) = anint((former(2) - bounds(2, 1))*folds(2))
+      shift(1) = shift(2)*cell%shift
+      shift(1) = shift(1) + anint((former(1) - (bounds(1, 1) + shift(1)))*folds(1))*cell%size(1)
+      shift(2) = shift(2)*cell%size(2)
       if (.not. any(abs(shift) > 0.0_wp)) return
       do b = 1, size(bounds, 2)
          bounds(:, b) = widened(bounds(:, b) + [shift, shift], abs(shift))

@@ -318,7 +318,7 @@ contains
          call update_box(maker, bodies, moving(k), boxes, is_first=.false.)
       end do
       !$omp end parallel do
-      call place_images(maker%images, boxes)
+      call place_images(maker%images, bodies%cell, boxes)
    end subroutine update_boxes
 
    !> Update the boxes of a body that is turned to its angle.

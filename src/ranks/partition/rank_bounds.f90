@@ -51,7 +51,7 @@ module polydem_rank_bounds
 contains
 
    !> Exchange the bounding rectangles of all ranks. Collective.
-   subroutine publish(self, comm, boxes, period)
+   subroutine publish(self, comm, boxes, period, is_sheared)
       class(rank_bounds_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
       !> xmin, ymin, xmax, ymax of the padded boxes of the bodies that this rank owns; the padding is the distance that
@@ -59,12 +59,17 @@ contains
       real(wp), intent(in) :: boxes(:, :)
       !> Width and height of the periodic cell, 0 along an axis that is not periodic; absent: the plane [m]
       real(wp), intent(in), optional :: period(2)
+      !> Whether copies of the cell above and below slide along x: they are then anywhere along x; default: no
+      logical, intent(in), optional :: is_sheared
       real(wp), allocatable :: mine(:, :), shift(:, :)
       real(dp), allocatable :: all_bounds(:)
       integer(ip), allocatable :: counts(:)
       integer(ip) :: rank, k, r, n
       integer :: c
+      logical :: slides
 
+      slides = .false.
+      if (present(is_sheared)) slides = is_sheared
       allocate (shift(2, 0))
       if (present(period)) call list_shifts(period, shift)
       call cover(boxes, mine)
@@ -83,14 +88,14 @@ contains
                self%owner(n) = rank
                self%copy(n) = c
                self%rectangle(:, n) = real(all_bounds(4_ip*(k + r) - 3_ip:4_ip*(k + r)), wp)
-               if (c > 0) self%rectangle(:, n) = moved(self%rectangle(:, n), shift(:, c))
+               if (c > 0) self%rectangle(:, n) = moved(self%rectangle(:, n), shift(:, c), slides)
             end do
          end do
          k = k + counts(rank)
       end do
       self%own = bounds_of(boxes)
       do c = 1, size(shift, 2)
-         self%own_copies(:, c) = moved(self%own, shift(:, c))
+         self%own_copies(:, c) = moved(self%own, shift(:, c), slides)
       end do
       call build_map(self)
       self%zone = zone_of(self)
@@ -117,12 +122,15 @@ contains
    end subroutine list_shifts
 
    !> A rectangle that covers another one after a shift, in spite of rounding [m]
-   pure function moved(rectangle, shift)
+   pure function moved(rectangle, shift, slides)
       real(wp), intent(in) :: rectangle(4), shift(2)
+      !> Whether copies above and below are anywhere along x
+      logical, intent(in) :: slides
       real(wp) :: moved(4), extra(2)
 
       extra = 8.0_wp*epsilon(1.0_wp)*(max(abs(rectangle(1:2)), abs(rectangle(3:4))) + abs(shift))
       moved = rectangle + [shift - extra, shift + extra]
+      if (slides .and. abs(shift(2)) > 0.0_wp) moved([1, 3]) = 0.125_wp*huge(1.0_wp)*[-1.0_wp, 1.0_wp]
    end function moved
 
    !> Cut the bounding rectangle of this rank at those of the other ranks and at all copies. Each of the four parts at a

@@ -66,6 +66,8 @@ class Frame:
         material          [1]      numbers of the materials: position in `material_names`, from 1; 0: none, (n)
         material_names    [1]      list of the names of the materials of the run
         image             [1]      cells crossed along each axis, (n, 2); None in the plane
+        slid              [m]      shifts of the borders of a sheared cell that each body has crossed, (n)
+        shift             [m]      displacement of the copy of a sheared cell above it, along x as of vectors
         cell_low          [m]      x and y of the lower left corner of the periodic cell, as of vectors
         cell_size         [m]      width and height of the periodic cell, as of vectors; 0 along an axis without period
 
@@ -88,6 +90,8 @@ class Frame:
     material: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     material_names: tuple[str, ...] = ()
     image: IntArray | None = None
+    slid: FloatArray | None = None
+    shift: float = 0.0
     cell_low: FloatArray = field(default_factory=lambda: np.zeros(2))
     cell_size: FloatArray = field(default_factory=lambda: np.zeros(2))
     _source: FrameSource | None = field(default=None)
@@ -178,13 +182,20 @@ class Frame:
     @property
     def unwrapped(self) -> FloatArray:
         """Centres of mass on their paths through the copies of a periodic cell [m], (n, 2)."""
-        return self.position if self.image is None else self.position + self.image * self.cell_size
+        if self.image is None:
+            return self.position
+        path = self.position + self.image * self.cell_size
+        return path if self.slid is None else path + np.column_stack([self.slid, np.zeros(len(self))])
 
     @property
     def shifts(self) -> FloatArray:
         """Vectors to the m copies of the periodic cell around it [m], (m, 2): none in the plane."""
         steps = [(-1, 0, 1) if size > 0.0 else (0,) for size in self.cell_size]
-        return np.array([(x, y) for x in steps[0] for y in steps[1] if x or y]).reshape(-1, 2) * self.cell_size
+        copies = np.array([(x, y) for x in steps[0] for y in steps[1] if x or y], dtype=float).reshape(-1, 2)
+        # A copy that slides by up to a width needs another one behind it.
+        if self.shift > 0.0:
+            copies = np.concatenate([copies, [(-2.0, 1.0), (2.0, -1.0)]])
+        return copies * self.cell_size + np.outer(copies[:, 1], [self.shift, 0.0])
 
     def nearest(self, first: IntArray, second: IntArray, vectors: FloatArray) -> FloatArray:
         """Vectors between bodies of these indices as those to the nearest copies [m], (k, 2).
@@ -192,12 +203,14 @@ class Frame:
         Fixed bodies that are about as long as the cell have no copies along it.
         """
         nearest = vectors.copy()
+        if self.shift > 0.0:
+            nearest[:, 0] -= np.rint(vectors[:, 1] / self.cell_size[1]) * self.shift
         for axis in np.flatnonzero(self.cell_size > 0.0):
             size = self.cell_size[axis]
             reach = np.abs(self.bounds[:, [axis, axis + 2]] - self.position[:, [axis]]).max(axis=1)
             spans = self.fixed & (4.0 * reach >= size)
             folded = ~(spans[first] | spans[second])
-            nearest[folded, axis] -= np.rint(vectors[folded, axis] / size) * size
+            nearest[folded, axis] -= np.rint(nearest[folded, axis] / size) * size
         return nearest
 
     @cached_property
@@ -376,6 +389,8 @@ def sound_frame(path: Path, frame: Frame) -> Frame:
     insist(path, "cell", cell, dict.fromkeys(cell, (2,)))
     if frame.image is not None:
         insist(path, "frames", {"image": frame.image}, {"image": (n, 2)})
+    if frame.slid is not None:
+        insist(path, "frames", {"slid": frame.slid}, {"slid": (n,)})
     masses = {"mass": frame.mass, "inertia": frame.inertia}
     if np.any(frame.material < 0) or np.any(frame.material > len(frame.material_names)):
         raise ResultError(f"{path}: bodies/material has numbers of materials that the namelist does not have")

@@ -301,13 +301,15 @@ class Trajectory:
         if self._bodies[0] != segment.path:
             self._bodies = (segment.path, _bodies_in(file))
         bodies = self._bodies[1]
-        columns = {name: frames[name][row] for name in (*GROWING, *(["image"] if "image" in frames else []))}
+        crossed = [name for name in ("image", "slid") if name in frames]
+        columns = {name: frames[name][row] for name in (*GROWING, *crossed)}
+        shift = float(frames["shift"][row]) if "shift" in frames else 0.0
         if self._shift is not None:
             columns["position"] = columns["position"] + self._shift
             bodies = {**bodies, "cell_low": bodies["cell_low"] + self._shift} if "cell_low" in bodies else bodies
         return sound_frame(segment.path, Frame(
-            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, **columns, **bodies,
-            material_names=tuple(self.settings.get("material", {})), _source=self))
+            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, shift=shift,
+            material_names=tuple(self.settings.get("material", {})), **columns, **bodies, _source=self))
 
     def contacts_of(self, frame: Frame) -> Contacts:
         """The contacts of a frame of this run; `frame.contacts` calls it."""
