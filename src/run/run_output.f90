@@ -47,7 +47,7 @@ contains
          line_due = is_line_due(run, s%step)
          call check_step(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
-         call measure_condition(s)
+         if (s%stages%number > 0_ip) call measure_condition(s)
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then
             call count_contacts(s, n_contacts)
@@ -74,7 +74,7 @@ contains
 
       associate (s => run%simulation)
          needs_table = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
-         needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
+         if (s%stages%number > 0_ip) needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
          needs_table = needs_table .or. needs_contacts(run%monitor, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
    end function needs_table

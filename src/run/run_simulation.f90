@@ -74,7 +74,7 @@ contains
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
          if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
-         if (.not. allocated(error)) call change_stage(run, error)
+         if (run%simulation%stages%number > 0_ip .and. .not. allocated(error)) call change_stage(run, error)
          if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
       end do
       call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
@@ -130,7 +130,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: begins
 
-      if (run%simulation%stages%number == 0_ip) return
       call decide_end(run%simulation)
       if (is_at_limit(run%simulation)) call write_checkpoint(run, error)
       if (allocated(error)) return
