@@ -109,7 +109,8 @@ contains
       end associate
    end subroutine check_scene
 
-   !> Check the speeds of oscillations, and that motions are given either in &scene or in groups &motion.
+   !> Check the speeds of oscillations and the ends of motions, and that motions are given either in &scene or in
+   !> groups &motion.
    pure subroutine check_motions(settings, instances, error)
       type(settings_t), intent(in) :: settings
       type(instance_t), intent(in) :: instances(:)
@@ -129,6 +130,10 @@ contains
             if (motion%kind == 'oscillation') call require( &
                two_pi*motion%frequency*maxval(abs(motion%amplitude)) < speed_limit, too_fast, 'amplitude', &
                'frequency', instances(index_of_instance(instances, 'motion', motion%name)), error)
+            if (motion%end > 0.0_wp) call require( &
+               motion%end > motion%start .and. motion%end - motion%start >= 2.0_wp*motion%ramp, &
+               'must be behind ''start'' by at least twice', 'end', 'ramp', &
+               instances(index_of_instance(instances, 'motion', motion%name)), error)
          end associate
       end do
    end subroutine check_motions

@@ -16,6 +16,7 @@ module polydem_scene
    use polydem_hopper, only: make_hopper
    use polydem_incline, only: make_incline
    use polydem_kinds, only: ip, lp, wp
+   use polydem_motion_file, only: read_motion_table
    use polydem_outlines, only: pi
    use polydem_parts, only: parts_t
    use polydem_place_parts, only: list_parts, wall_bodies_t
@@ -227,6 +228,10 @@ contains
             end if
          end associate
          motions(k) = prescribed(settings%motion(k))
+         if (motions(k)%kind /= 'table') cycle
+         allocate (motions(k)%table)
+         call read_motion_table(settings, settings%motion(k), motions(k)%table, error)
+         if (allocated(error)) return
       end do
       allocate (wall_of(size(slots)), first(size(slots)))
       wall_of = 0_ip
@@ -259,6 +264,9 @@ contains
       prescribed%frequency = 2.0_wp*pi*motion%frequency
       prescribed%start = motion%start
       prescribed%ramp = motion%ramp
+      if (.not. motion%end > 0.0_wp) return
+      prescribed%end = motion%end
+      prescribed%ramp_down = motion%ramp
    end function prescribed
 
    !> Identifiers of the bodies that a motion moves; none if it moves all fixed bodies

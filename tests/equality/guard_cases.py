@@ -88,7 +88,7 @@ VARIED = {
     "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84", "scene.bodies_file": None,
     "motion.one.bodies": "82, 84", "motion.one.pivot": "0.01, 0.02", "motion.one.rate": "1",
     "motion.one.velocity": "0.1, 0.2", "motion.one.amplitude": "1e-3, 0", "motion.one.frequency": "50",
-    "motion.one.start": "0.005", "motion.one.ramp": "0.01",
+    "motion.one.start": "0.005", "motion.one.ramp": "0.01", "motion.one.end": "0.02", "motion.one.file": None,
     "wall.one.from": "-0.2, -0.2", "wall.one.to": "0.2, -0.2", "wall.one.low": "-0.2, -0.2",
     "wall.one.high": "0.2, -0.11", "wall.one.angle": "3", "wall.one.centre": "0.01, 0", "wall.one.radius": "0.12",
     "wall.one.segments": "30", "wall.one.vertices": "-0.2, -0.3, 0.2, -0.3, 0, -0.15", "wall.one.thickness": "0.02",
@@ -121,12 +121,14 @@ VARIED = {
 BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
-             "wall.one.bodies": "as motion.one.bodies", "grains.one.packing": "as scene.packing",
+             "wall.one.bodies": "as motion.one.bodies", "motion.one.file": "test_motion_file.pf",
+             "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
-UNTRIED = {("wall.one.outline", "bodies"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
+UNTRIED = {("wall.one.outline", "bodies"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column"),
+           ("motion.one.kind", "table")}
 
 #: Numbers of ranks of the program with MPI
 RANKS = (1, 2, 3)
