@@ -13,7 +13,7 @@ module polydem_prescribed_motion
    use polydem_motion_table, only: evaluate_table, motion_table_t
    implicit none
    private
-   public :: motion_t, pose_bodies, carry_bodies, starts_from_reference
+   public :: motion_t, pose_bodies, carry_bodies, starts_from_reference, turn_about
 
    !> Prescribed motion
    type :: motion_t
@@ -151,8 +151,22 @@ contains
       end do
    end subroutine carry_bodies
 
+   !> Turn bodies about a pivot, from their present positions, angles, velocities and accelerations.
+   pure subroutine turn_about(pivot, angle, rate, growth, slots, bodies)
+      !> The pivot, (2) [m]
+      real(wp), intent(in) :: pivot(2)
+      !> Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s2]
+      real(wp), intent(in) :: angle, rate, growth
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle, velocities and accelerations of the bodies in the slots change
+      type(bodies_t), intent(inout) :: bodies
+
+      call rotate_further(pivot, ramp_t(angle, rate, growth), slots, bodies)
+   end subroutine turn_about
+
    !> x = p + R (x0 - p) with moving x0: the velocity is R v0 + w x R (x0 - p), and the acceleration follows likewise.
-   subroutine rotate_further(pivot, rotation, slots, bodies)
+   pure subroutine rotate_further(pivot, rotation, slots, bodies)
       real(wp), intent(in) :: pivot(2)
       !> Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s2]
       type(ramp_t), intent(in) :: rotation

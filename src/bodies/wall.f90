@@ -1,4 +1,5 @@
-!> Walls: fixed bodies that move as one. Their pose is the reference pose, to which each motion is applied in turn.
+!> Walls: fixed bodies that move as one. Their pose is the reference pose, to which each motion is applied in turn. What
+!> loads displace further comes on top of it.
 module polydem_wall
    use polydem_bodies, only: bodies_t
    use polydem_elementary, only: hypotenuse
@@ -11,7 +12,7 @@ module polydem_wall
    private
    public :: wall_t, new_wall, move_wall, find_slots, greatest_wall_speed, has_table, hash_of_tables
 
-   !> A wall with prescribed motions
+   !> A wall with prescribed motions, or with loads
    type :: wall_t
       !> Slots of its bodies
       integer(ip), allocatable :: slots(:)
@@ -21,6 +22,8 @@ module polydem_wall
       real(wp), allocatable :: angle(:)
       !> Motions, of which each one moves what the motions before it have moved
       type(motion_t), allocatable :: motions(:)
+      !> Whether loads displace it from where the motions place it
+      logical :: is_loaded = .false.
    end type wall_t
 
 contains
@@ -29,7 +32,7 @@ contains
    pure subroutine new_wall(wall, motions, bodies, slots)
       !> The wall
       type(wall_t), intent(out) :: wall
-      !> Its motions in their order, at least one
+      !> Its motions in their order
       type(motion_t), intent(in) :: motions(:)
       !> All bodies
       type(bodies_t), intent(in) :: bodies
@@ -73,7 +76,7 @@ contains
       logical :: is_moved
       integer :: k
 
-      if (size(wall%motions) /= 1) then
+      if (size(wall%motions) /= 1 .or. wall%is_loaded) then
          call reset_bodies(wall, bodies)
       else if (.not. starts_from_reference(wall%motions(1))) then
          call reset_bodies(wall, bodies)

@@ -55,6 +55,19 @@ contains
             end if
          end associate
       end associate
+      if (settings%output%csv .and. .not. settings%output%series_interval > 0.0_wp) then
+         associate (group => instances(index_of_instance(instances, 'output')))
+            call raise(error, input_error, group%values(row_of(group, 'csv'))%place// &
+               ': ''csv'' in &output needs a series; give ''series_interval'', for example 1e-3')
+         end associate
+      end if
+      if (settings%output%trace_steps > 0 .and. any(settings%wall%vanish_at > 0.0_wp)) then
+         associate (group => instances(index_of_instance(instances, 'output')))
+            call raise(error, input_error, group%values(row_of(group, 'trace_steps'))%place// &
+               ': ''trace_steps'' in &output cannot be combined with ''vanish_at'' in &wall, because a trace has '// &
+               'the same boxes in all steps')
+         end associate
+      end if
       if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then
          associate (group => instances(index_of_instance(instances, 'guards')))
             call raise(error, input_error, group%values(row_of(group, 'energy'))%place// &

@@ -18,7 +18,9 @@ module polydem_checkpoint_fields
    use polydem_replace_bodies, only: settle_bodies
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
+   use polydem_vanishing_walls, only: find_release
    use polydem_wall, only: has_table, hash_of_tables
+   use polydem_wall_load, only: serialize_loads
    implicit none
    private
    public :: attempts_t, serialize_run, serialize_progress
@@ -103,6 +105,13 @@ contains
          call serializer%seconds_field('/run/stage_least', s%timers%least, 'shortest time in a step')
          call serializer%seconds_field('/run/stage_most', s%timers%most, 'longest time in a step')
          if (s%settings%output%energy_balance) call serialize_balance(s%energy_balance, serializer)
+         if (.not. serializer%is_reading) call find_release(s)
+         call s%named%serialize_gates(serializer)
+         if (allocated(s%loads)) call serialize_loads(s%loads, serializer)
+         if (s%settings%output%series_interval > 0.0_wp) then
+            call s%record%serialize(serializer)
+            call s%series%serialize(serializer)
+         end if
       end associate
    end subroutine serialize_global
 

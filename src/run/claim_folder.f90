@@ -7,7 +7,7 @@ module polydem_claim_folder
    use polydem_manifest, only: longest_name, manifest_t
    use polydem_motion_file, only: table_path
    use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
-      steps_name, trace_name
+      series_name, steps_name, trace_name
    use polydem_set_aside, only: set_aside
    use polydem_settings, only: output_settings_t, settings_t
    implicit none
@@ -106,6 +106,7 @@ contains
       if (output%trace_steps > 0_ip) names = [character(len=longest_name) :: names, trace_name]
       if (output%step_profile) names = [character(len=longest_name) :: names, steps_name]
       if (has_deep_contacts) names = [character(len=longest_name) :: names, overlaps_name]
+      if (output%csv) names = [character(len=longest_name) :: names, series_name]
    end subroutine list_output_names
 
 end module polydem_claim_folder

@@ -42,7 +42,7 @@ contains
       call choose_communicator(ranks, comm)
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
-      call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size)
+      call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size, self%named, self%loads)
       call ranks%all_reduce_error(error)
       if (present(threads) .and. .not. allocated(error)) &
          call set_threads(threads, ranks, size(self%bodies%free, kind=ip), error)

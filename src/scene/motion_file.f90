@@ -8,7 +8,7 @@ module polydem_motion_file
    use polydem_outlines, only: pi
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
-   use polydem_strings, only: lower_case, printable, quoted, to_text
+   use polydem_strings, only: index_of, lower_case, printable, quoted, to_text
    implicit none
    private
    public :: read_motion_table, table_path
@@ -161,7 +161,7 @@ contains
       first = 1
       do while (first <= len(line) + 1)
          call next_field(line, first, word)
-         k = findloc(columns, lower_case(word), 1)
+         k = index_of(lower_case(word), columns)
          if (k == 0) then
             problem = 'unknown column '//quoted(printable(word))//' in the header; the columns are time,x,y,angle'
          else if (any(place == k)) then

@@ -30,6 +30,8 @@ contains
       !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
       real(wp), intent(in), optional :: median_diameter
 
+      call self%named%find_slots(self%bodies)
+      call self%named%mark_gone(self%bodies)
       call new_force_law(self%settings%forces, self%bodies, self%law)
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip

@@ -92,7 +92,10 @@ VARIED = {
     "wall.one.from": "-0.2, -0.2", "wall.one.to": "0.2, -0.2", "wall.one.low": "-0.2, -0.2",
     "wall.one.high": "0.2, -0.11", "wall.one.angle": "3", "wall.one.centre": "0.01, 0", "wall.one.radius": "0.12",
     "wall.one.segments": "30", "wall.one.vertices": "-0.2, -0.3, 0.2, -0.3, 0, -0.15", "wall.one.thickness": "0.02",
-    "wall.one.bodies": None, "motion.one.wall": "one",
+    "wall.one.bodies": None, "wall.one.vanish_at": "0.01", "motion.one.wall": "one",
+    "load.one.wall": "one", "load.one.force": "20", "load.one.stress": "200", "load.one.width": "0.2",
+    "load.one.between": None, "load.one.torque": "1", "load.one.pivot": "0.01, 0.02", "load.one.mass": "2",
+    "load.one.damping_ratio": "0.1", "load.one.start": "0.005", "load.one.end": "0.015", "load.one.ramp": "0.01",
     "grains.one.low": "-0.05, -0.05", "grains.one.high": "0.05, 0.05", "grains.one.centre": "0.01, 0",
     "grains.one.radius": "0.08", "grains.one.vertices": "-0.05, -0.05, 0.05, -0.05, 0, 0.05", "grains.one.wall": "one",
     "grains.one.at": "0.01, 0", "grains.one.number": "30", "grains.one.number@at": None,
@@ -114,15 +117,17 @@ VARIED = {
     "decomposition.margin": "1e-3", "decomposition.imbalance": "2",
     "output.folder": None, "output.frame_interval": "0.002", "output.frames_per_segment": "3",
     "output.log_interval": "1e-3",
-    "output.trace_steps": "20", "output.trace_start": "0.01",
+    "output.series_interval": "1e-3", "output.trace_steps": "20", "output.trace_start": "0.01",
     "checkpoint.steps": "50", "checkpoint.interval": "0.01", "checkpoint.elapsed": None,
 }
 #: What an entry needs beside it to have an effect
-BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"}}
+BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"},
+          "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
+          "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
              "wall.one.bodies": "as motion.one.bodies", "motion.one.file": "test_motion_file.pf",
-             "grains.one.packing": "as scene.packing",
+             "grains.one.packing": "as scene.packing", "load.one.between": "inputs/biaxial.nml",
              "grains.one.number": "blocks of scene.name = stack",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 
@@ -226,7 +231,7 @@ def entry_cases(entries):
             continue
         condition, words = entry.condition or ("", ())
         scene = words[next(turn) % len(words)] if condition == "scene.name" else "drum"
-        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall")) else scene
+        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall", "load.")) else scene
         base = dict(SCENES[scene])
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
             base[condition] = words[0]
@@ -235,6 +240,8 @@ def entry_cases(entries):
             base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
         if entry.name.startswith("motion."):
             base.setdefault(f"motion.{NAME}.kind", "rotation")
+        if entry.name.startswith("load."):
+            base = {f"load.{NAME}.wall": NAME, f"load.{NAME}.direction": "x", **base}
         for value in values_of(entry, "at" if base.get(f"grains.{NAME}.region") == "at" else scene):
             settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
             if scene == "parts":
@@ -275,7 +282,7 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED[entry.name] for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith(("scene.motion_", "motion.", *PARTS)) and entry.condition
+            and entry.name.startswith(("scene.motion_", "motion.", "load.", *PARTS)) and entry.condition
             and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
 

@@ -19,11 +19,11 @@ FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
                     (Path(__file__).parents[2] / "inputs" / "entries.md").read_text(encoding="utf-8"),
                     re.MULTILINE).group(1).split(", ")
 #: How often bodies are handed out anew at least; grains in a stack hardly move
-LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "stack": 1}
+LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "walls": 100, "stack": 1}
 #: What is tried unless all is: every scene on several numbers of ranks, every finder and number of threads somewhere
 QUICK = [(scene, ranks, 1 + (ranks + k) % 2, FINDERS[(3 * k + n) % len(FINDERS)])
          for k, scene in enumerate(SCENES)
-         for n, ranks in enumerate(((2, 4, 3), (1, 3, 7), (2, 3, 4), (1, 4, 2), (1, 2, 7), (2, 3, 7))[k])]
+         for n, ranks in enumerate(((2, 4, 3), (1, 3, 7), (2, 3, 4), (1, 4, 2), (1, 2, 7), (2, 3, 7), (2, 3, 4))[k])]
 
 
 def pytest_generate_tests(metafunc):
@@ -127,8 +127,9 @@ def interrupt(folder, namelist, ranks, options):
     return int(re.search(r"interrupted by SIGUSR1 at step (\d+) of", message).group(1)), output
 
 
-@pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1))],
-                         ids=("drum-3-2-serial", "gas-serial-4-3", "bed-2-7-1"))
+@pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1)),
+                                          ("walls", (2, 3, None))],
+                         ids=("drum-3-2-serial", "gas-serial-4-3", "bed-2-7-1", "walls-2-3-serial"))
 def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_path):
     write_scene(tmp_path / "scene.nml", scene, longer=3)
     options = ("--set", "checkpoint.steps=100")
