@@ -8,7 +8,7 @@ module polydem_named_values
    public :: named_values_t
 
    !> Maximum length of the name of an entry
-   integer, parameter :: name_length = 32
+   integer, parameter :: name_length = 80
    !> Maximum length of the unit of an entry
    integer, parameter :: unit_length = 16
    !> Maximum length of the meaning of an entry

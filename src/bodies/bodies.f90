@@ -86,6 +86,9 @@ module polydem_bodies
       real(wp), allocatable :: diameter(:)
       !> Twice the least distance of an edge from the centre of mass [m]
       real(wp), allocatable :: thickness(:)
+      !> Whether the body is one of a wall that has vanished: it has no box and meets nothing, (slot); not allocated if
+      !> no wall vanishes
+      logical, allocatable :: gone(:)
    end type bodies_t
 
 contains

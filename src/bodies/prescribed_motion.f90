@@ -1,24 +1,29 @@
-!> Prescribed motion of fixed bodies: rotation about a pivot, translation, oscillation.
+!> Prescribed motion of fixed bodies: rotation about a pivot, translation, oscillation, conveyor, table of poses.
 !>
 !> The displacement is a closed function of time, never a sum over steps. Every motion starts smoothly: during
 !> the ramp the rate rises as s(u) = u^2 (3 - 2 u) with u = (t - start)/ramp; the integral of s is u^3 - u^4/2.
+!> Before its end it slows down in the same way. From then on the bodies are at rest in their last pose, which
+!> follows from the time within the motion and therefore needs no memory.
+!>
+!> A conveyor gives the surface of bodies a velocity without moving them: friction and dampings see it.
 module polydem_prescribed_motion
    use polydem_bodies, only: bodies_t
    use polydem_elementary, only: sine_and_cosine
    use polydem_kinds, only: ip, wp
+   use polydem_motion_table, only: evaluate_table, motion_table_t
    implicit none
    private
-   public :: motion_t, pose_bodies, carry_bodies
+   public :: motion_t, pose_bodies, carry_bodies, starts_from_reference, turn_about
 
    !> Prescribed motion
    type :: motion_t
-      !> 'rotation', 'translation' or 'oscillation', as in the namelist
+      !> 'rotation', 'translation', 'oscillation', 'conveyor' or 'table', as in the namelist
       character(len=11) :: kind = ''
-      !> Centre of a rotation, (2) [m]
+      !> Centre of the rotation, also of that of a table, (2) [m]
       real(wp) :: pivot(2) = 0.0_wp
       !> Angular velocity of a rotation, anticlockwise [rad/s]
       real(wp) :: rate = 0.0_wp
-      !> Velocity of a translation, (2) [m/s]
+      !> Velocity of a translation, or of the surface of a conveyor, (2) [m/s]
       real(wp) :: velocity(2) = 0.0_wp
       !> Amplitude of an oscillation, (2) [m]
       real(wp) :: amplitude(2) = 0.0_wp
@@ -26,12 +31,16 @@ module polydem_prescribed_motion
       real(wp) :: frequency = 0.0_wp
       !> Time at which the motion begins [s]
       real(wp) :: start = 0.0_wp
+      !> Time from the start to the full rate [s]
+      real(wp) :: ramp = 0.0_wp
       !> Time at which the motion ends [s]
       real(wp) :: end = huge(1.0_wp)
       !> Number of the stage of the run in which it acts, which sets start and end; 0: it depends on no stage
       integer(ip) :: stage = 0_ip
-      !> Time from the start to the full rate [s]
-      real(wp) :: ramp = 0.0_wp
+      !> Time before the end in which the motion slows down; 0 if the end was not known at the start [s]
+      real(wp) :: ramp_down = 0.0_wp
+      !> Poses of a table
+      type(motion_table_t), allocatable :: table
    end type motion_t
 
    !> Ramp of a motion, which rises smoothly from rest to the full rate
@@ -124,9 +133,14 @@ contains
       type(shift_t) :: shift
       integer(ip) :: k
 
+      if (motion%kind == 'table') then
+         call follow_table(motion, time, slots, bodies)
+         return
+      end if
       ramp = ramp_at(motion, time)
       if (motion%kind == 'rotation') then
-         call rotate_further(motion, ramp, slots, bodies)
+         call rotate_further(motion%pivot, ramp_t(motion%rate*ramp%elapsed, motion%rate*ramp%factor, &
+                                                  motion%rate*ramp%growth), slots, bodies)
          return
       end if
       shift = shift_at(motion, ramp)
@@ -139,25 +153,40 @@ contains
       end do
    end subroutine carry_bodies
 
+   !> Turn bodies about a pivot, from their present positions, angles, velocities and accelerations.
+   pure subroutine turn_about(pivot, angle, rate, growth, slots, bodies)
+      !> The pivot, (2) [m]
+      real(wp), intent(in) :: pivot(2)
+      !> Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s2]
+      real(wp), intent(in) :: angle, rate, growth
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle, velocities and accelerations of the bodies in the slots change
+      type(bodies_t), intent(inout) :: bodies
+
+      call rotate_further(pivot, ramp_t(angle, rate, growth), slots, bodies)
+   end subroutine turn_about
+
    !> x = p + R (x0 - p) with moving x0: the velocity is R v0 + w x R (x0 - p), and the acceleration follows likewise.
-   subroutine rotate_further(motion, ramp, slots, bodies)
-      type(motion_t), intent(in) :: motion
-      type(ramp_t), intent(in) :: ramp
+   pure subroutine rotate_further(pivot, rotation, slots, bodies)
+      real(wp), intent(in) :: pivot(2)
+      !> Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s2]
+      type(ramp_t), intent(in) :: rotation
       integer(ip), intent(in) :: slots(:)
       type(bodies_t), intent(inout) :: bodies
       real(wp) :: turn, rate, growth, c, s, arm(2), velocity(2), acceleration(2)
       integer(ip) :: k, slot
 
-      turn = motion%rate*ramp%elapsed
-      rate = motion%rate*ramp%factor
-      growth = motion%rate*ramp%growth
+      turn = rotation%elapsed
+      rate = rotation%factor
+      growth = rotation%growth
       call sine_and_cosine(turn, s, c)
       do k = 1_ip, size(slots, kind=ip)
          slot = slots(k)
-         arm = turned(bodies%position(:, slot) - motion%pivot)
+         arm = turned(bodies%position(:, slot) - pivot)
          velocity = turned(bodies%velocity(:, slot))
          acceleration = turned(bodies%acceleration(:, slot))
-         bodies%position(:, slot) = motion%pivot + arm
+         bodies%position(:, slot) = pivot + arm
          bodies%angle(slot) = bodies%angle(slot) + turn
          bodies%velocity(:, slot) = velocity + rate*[-arm(2), arm(1)]
          bodies%angular_velocity(slot) = bodies%angular_velocity(slot) + rate
@@ -177,8 +206,40 @@ contains
 
    end subroutine rotate_further
 
+   !> Turn bodies by the angle of a table, then shift them.
+   subroutine follow_table(motion, time, slots, bodies)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      integer(ip), intent(in) :: slots(:)
+      type(bodies_t), intent(inout) :: bodies
+      real(wp) :: value(3), rate(3), growth(3)
+      integer(ip) :: k
+
+      call evaluate_table(motion%table, min(time, motion%end) - motion%start, value, rate, growth)
+      if (time >= motion%end) then
+         rate = 0.0_wp
+         growth = 0.0_wp
+      end if
+      if (any(abs(motion%table%value(3, :)) > 0.0_wp)) &
+         call rotate_further(motion%pivot, ramp_t(value(3), rate(3), growth(3)), slots, bodies)
+      do k = 1_ip, size(slots, kind=ip)
+         associate (slot => slots(k))
+            bodies%position(:, slot) = bodies%position(:, slot) + value(:2)
+            bodies%velocity(:, slot) = bodies%velocity(:, slot) + rate(:2)
+            bodies%acceleration(:, slot) = bodies%acceleration(:, slot) + growth(:2)
+         end associate
+      end do
+   end subroutine follow_table
+
+   !> Whether a motion can set the poses of bodies from their reference poses (`pose_bodies`)
+   pure logical function starts_from_reference(motion)
+      type(motion_t), intent(in) :: motion
+
+      starts_from_reference = motion%kind /= 'table' .and. motion%kind /= 'conveyor'
+   end function starts_from_reference
+
    !> Displacement of a translation, or of an oscillation x = x0 + a sin(w e(t)) with the ramped time e. The amplitude
-   !> of an oscillation is full from the start; the frequency rises.
+   !> of an oscillation is full from the start; the frequency rises. A conveyor has no displacement.
    type(shift_t) function shift_at(motion, ramp) result(shift)
       type(motion_t), intent(in) :: motion
       type(ramp_t), intent(in) :: ramp
@@ -186,6 +247,8 @@ contains
 
       if (motion%kind == 'translation') then
          shift = shift_t(motion%velocity, ramp%elapsed, ramp%factor, ramp%growth)
+      else if (motion%kind == 'conveyor') then
+         shift = shift_t(motion%velocity, 0.0_wp, ramp%factor, ramp%growth)
       else
          rate = motion%frequency*ramp%factor
          call sine_and_cosine(motion%frequency*ramp%elapsed, s, c)
@@ -193,26 +256,30 @@ contains
       end if
    end function shift_at
 
-   !> The ramp of a motion at a time. From its end on the bodies rest in the pose that they have reached.
+   !> The ramp of a motion at a time
    pure type(ramp_t) function ramp_at(motion, time) result(ramp)
-      type(motion_t), intent(in) :: motion
-      !> Time since the start of the run [s]
-      real(wp), intent(in) :: time
-
-      ramp = rise_at(motion, min(time, motion%end))
-      if (time < motion%end) return
-      ramp%factor = 0.0_wp
-      ramp%growth = 0.0_wp
-   end function ramp_at
-
-   !> The ramp of a motion without an end
-   pure type(ramp_t) function rise_at(motion, time) result(ramp)
       type(motion_t), intent(in) :: motion
       !> Time since the start of the run [s]
       real(wp), intent(in) :: time
       real(wp) :: u
 
       if (time < motion%start) return
+      ramp = rise_at(motion, min(time, motion%end - motion%ramp_down))
+      if (time <= motion%end - motion%ramp_down .and. time < motion%end) return
+      u = 0.0_wp
+      if (motion%ramp_down > 0.0_wp) u = max(0.0_wp, (motion%end - time)/motion%ramp_down)
+      ramp = ramp_t(ramp%elapsed + motion%ramp_down*(0.5_wp - u*u*u*(1.0_wp - 0.5_wp*u)), &
+                    u*u*(3.0_wp - 2.0_wp*u), 0.0_wp)
+      if (u > 0.0_wp) ramp%growth = -6.0_wp*u*(1.0_wp - u)/motion%ramp_down
+   end function ramp_at
+
+   !> The ramp of a motion without an end
+   pure type(ramp_t) function rise_at(motion, time) result(ramp)
+      type(motion_t), intent(in) :: motion
+      !> Time since the start of the run, not before the start of the motion [s]
+      real(wp), intent(in) :: time
+      real(wp) :: u
+
       if (time - motion%start >= motion%ramp) then
          ramp = ramp_t(time - motion%start - 0.5_wp*motion%ramp, 1.0_wp, 0.0_wp)
       else

@@ -1,15 +1,18 @@
-!> Walls: fixed bodies that move as one. Their pose is the reference pose, to which each motion is applied in turn.
+!> Walls: fixed bodies that move as one. Their pose is the reference pose, to which each motion is applied in turn. What
+!> loads displace further comes on top of it.
 module polydem_wall
    use polydem_bodies, only: bodies_t
    use polydem_elementary, only: hypotenuse
-   use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: carry_bodies, motion_t, pose_bodies
+   use polydem_hash, only: mix_word
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_motion_table, only: greatest_rates, greatest_values
+   use polydem_prescribed_motion, only: carry_bodies, motion_t, pose_bodies, starts_from_reference
    use polydem_sort, only: place_in
    implicit none
    private
-   public :: wall_t, new_wall, move_wall, find_slots, greatest_wall_speed
+   public :: wall_t, new_wall, move_wall, find_slots, greatest_wall_speed, has_table, hash_of_tables
 
-   !> A wall with prescribed motions
+   !> A wall with prescribed motions, or with loads
    type :: wall_t
       !> Slots of its bodies
       integer(ip), allocatable :: slots(:)
@@ -19,6 +22,8 @@ module polydem_wall
       real(wp), allocatable :: angle(:)
       !> Motions, of which each one moves what the motions before it have moved
       type(motion_t), allocatable :: motions(:)
+      !> Whether loads displace it from where the motions place it
+      logical :: is_loaded = .false.
    end type wall_t
 
 contains
@@ -27,7 +32,7 @@ contains
    pure subroutine new_wall(wall, motions, bodies, slots)
       !> The wall
       type(wall_t), intent(out) :: wall
-      !> Its motions in their order, at least one
+      !> Its motions in their order
       type(motion_t), intent(in) :: motions(:)
       !> All bodies
       type(bodies_t), intent(in) :: bodies
@@ -71,11 +76,15 @@ contains
       logical :: is_moved
       integer :: k
 
-      if (size(wall%motions) > 1) call reset_bodies(wall, bodies)
+      if (size(wall%motions) /= 1 .or. wall%is_loaded) then
+         call reset_bodies(wall, bodies)
+      else if (.not. starts_from_reference(wall%motions(1))) then
+         call reset_bodies(wall, bodies)
+      end if
       is_moved = .false.
       do k = 1, size(wall%motions)
          if (time < wall%motions(k)%start) cycle
-         if (is_moved) then
+         if (is_moved .or. .not. starts_from_reference(wall%motions(k))) then
             call carry_bodies(wall%motions(k), time, wall%slots, bodies)
          else
             call pose_bodies(wall%motions(k), time, wall%slots, wall%position, wall%angle, bodies)
@@ -102,6 +111,32 @@ contains
       end do
    end subroutine reset_bodies
 
+   !> Whether one of the motions of a wall follows a table
+   pure logical function has_table(wall)
+      type(wall_t), intent(in) :: wall
+
+      has_table = any(wall%motions%kind == 'table')
+   end function has_table
+
+   !> Hash of the tables of the motions of a wall
+   pure integer(lp) function hash_of_tables(wall) result(hash)
+      type(wall_t), intent(in) :: wall
+      integer :: i, j, k
+
+      hash = 0_lp
+      do k = 1, size(wall%motions)
+         if (.not. allocated(wall%motions(k)%table)) cycle
+         associate (table => wall%motions(k)%table)
+            do j = 1, size(table%time)
+               hash = mix_word(hash, transfer(real(table%time(j), dp), 0_lp))
+               do i = 1, 3
+                  hash = mix_word(hash, transfer(real(table%value(i, j), dp), 0_lp))
+               end do
+            end do
+         end associate
+      end do
+   end function hash_of_tables
+
    !> Upper bound of the speed of any point of the bodies of a wall; of one motion, the greatest speed [m/s]
    pure real(wp) function greatest_wall_speed(wall, radius, duration) result(speed)
       type(wall_t), intent(in) :: wall
@@ -109,8 +144,8 @@ contains
       real(wp), intent(in) :: radius(:)
       !> Duration of the run, in which a motion can move a body away from the pivot of the next one [s]
       real(wp), intent(in) :: duration
-      real(wp) :: arm, reach
-      integer :: j, k
+      real(wp) :: arm, reach, rates(3), values(3)
+      integer :: k
 
       speed = 0.0_wp
       reach = 0.0_wp
@@ -118,24 +153,44 @@ contains
          associate (motion => wall%motions(k))
             select case (motion%kind)
             case ('rotation')
-               arm = 0.0_wp
-               do j = 1, size(wall%slots)
-                  arm = max(arm, radius(wall%slots(j)) + hypotenuse(wall%position(1, j) - motion%pivot(1), &
-                                                                    wall%position(2, j) - motion%pivot(2)))
-               end do
+               arm = greatest_arm(motion%pivot)
                speed = speed + abs(motion%rate)*(arm + reach)
                reach = reach + 2.0_wp*(arm + reach)
             case ('translation')
                speed = speed + hypotenuse(motion%velocity(1), motion%velocity(2))
                ! The start of a motion in a stage is not known yet.
                reach = reach + hypotenuse(motion%velocity(1), motion%velocity(2)) &
-                       *max(0.0_wp, duration - merge(0.0_wp, motion%start, motion%stage > 0_ip))
+                       *max(0.0_wp, min(duration, motion%end) - merge(0.0_wp, motion%start, motion%stage > 0_ip))
+            case ('conveyor')
+               speed = speed + hypotenuse(motion%velocity(1), motion%velocity(2))
+            case ('table')
+               rates = greatest_rates(motion%table)
+               values = greatest_values(motion%table)
+               arm = greatest_arm(motion%pivot)
+               speed = speed + rates(3)*(arm + reach) + hypotenuse(rates(1), rates(2))
+               if (values(3) > 0.0_wp) reach = reach + 2.0_wp*(arm + reach)
+               reach = reach + hypotenuse(values(1), values(2))
             case default
                speed = speed + motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
                reach = reach + hypotenuse(motion%amplitude(1), motion%amplitude(2))
             end select
          end associate
       end do
+
+   contains
+
+      !> Greatest distance of a vertex from a pivot before all motions [m]
+      pure real(wp) function greatest_arm(pivot) result(arm)
+         real(wp), intent(in) :: pivot(2)
+         integer :: j
+
+         arm = 0.0_wp
+         do j = 1, size(wall%slots)
+            arm = max(arm, radius(wall%slots(j)) + hypotenuse(wall%position(1, j) - pivot(1), &
+                                                              wall%position(2, j) - pivot(2)))
+         end do
+      end function greatest_arm
+
    end function greatest_wall_speed
 
 end module polydem_wall

@@ -1,7 +1,9 @@
 !> Checks of the groups &grains and &wall, and of the entries that name walls, against each other.
 module polydem_check_parts
+   use polydem_blame_entry, only: blame
+   use polydem_check_loads, only: check_loads
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_group_instances, only: index_of_instance, instance_t, row_of
+   use polydem_group_instances, only: index_of_instance, instance_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_missing_entries, only: example_of
    use polydem_namelist_entries, only: entries, first_row
@@ -40,6 +42,7 @@ contains
                'them', error)
          end associate
       end do
+      call check_loads(settings, instances, error)
       do k = 1, size(settings%wall)
          if (settings%wall(k)%outline == 'bodies') call check_bodies(settings, k, instances, error)
       end do
@@ -130,8 +133,8 @@ contains
          'cannot be combined with sizes = ''octaves''', error, 'sizes')
    end subroutine check_group
 
-   !> Check a wall that consists of bodies of a file: there is a file, a motion moves the wall, and no other wall has
-   !> its bodies.
+   !> Check a wall that consists of bodies of a file: there is a file, a motion moves the wall, a load acts on it, it
+   !> vanishes or the series has it, and no other wall has its bodies.
    pure subroutine check_bodies(settings, w, instances, error)
       type(settings_t), intent(in) :: settings
       !> Number of the wall
@@ -145,15 +148,19 @@ contains
                                                                                    settings%wall(w)%name)))
          if (settings%scene%bodies_file == '' .and. settings%scene%name /= 'result') call blame(instance, 'bodies', &
             'needs ''bodies_file'' in &scene, which has these bodies', error)
-         is_used = .false.
+         is_used = wall%vanish_at > 0.0_wp .or. settings%output%series_interval > 0.0_wp
          do k = 1, size(settings%motion)
             is_used = is_used .or. settings%motion(k)%wall == wall%name
+         end do
+         do k = 1, size(settings%load)
+            is_used = is_used .or. settings%load(k)%wall == wall%name
          end do
          do k = 1, size(settings%stage)
             is_used = is_used .or. any([settings%stage(k)%wall, settings%stage(k)%opposite] == wall%name)
          end do
          if (.not. is_used) call blame(instance, 'outline', '= ''bodies'' gives a name to bodies that no '// &
-            '&motion or &stage uses; leave out this wall, or write wall = '//quoted(wall%name)//' in a &motion', error)
+            '&motion, &load or &stage uses; leave out this wall, or write wall = '//quoted(wall%name)// &
+            ' in a &motion', error)
          do k = 1, w - 1
             do j = 1, size(settings%wall(k)%bodies)
                if (any(wall%bodies == settings%wall(k)%bodies(j))) call blame(instance, 'bodies', 'contains body '// &
@@ -163,23 +170,5 @@ contains
          end do
       end associate
    end subroutine check_bodies
-
-   !> Raise an error about an entry of a group that has a name. It names the place of another entry if this one alone is
-   !> given on the command line.
-   pure subroutine blame(instance, key, problem, error, other)
-      type(instance_t), intent(in) :: instance
-      character(len=*), intent(in) :: key, problem
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: other
-      integer :: row
-
-      row = row_of(instance, key)
-      if (present(other)) then
-         if (instance%values(row_of(instance, other))%is_override .and. .not. instance%values(row)%is_override) &
-            row = row_of(instance, other)
-      end if
-      call raise(error, input_error, instance%values(row)%place//': '''//key//''' in &'//trim(instance%group)//' '// &
-                 instance%name//' '//problem)
-   end subroutine blame
 
 end module polydem_check_parts

@@ -59,6 +59,19 @@ contains
             end if
          end associate
       end associate
+      if (settings%output%csv .and. .not. settings%output%series_interval > 0.0_wp) then
+         associate (group => instances(index_of_instance(instances, 'output')))
+            call raise(error, input_error, group%values(row_of(group, 'csv'))%place// &
+               ': ''csv'' in &output needs a series; give ''series_interval'', for example 1e-3')
+         end associate
+      end if
+      if (settings%output%trace_steps > 0 .and. any(settings%wall%vanish_at > 0.0_wp)) then
+         associate (group => instances(index_of_instance(instances, 'output')))
+            call raise(error, input_error, group%values(row_of(group, 'trace_steps'))%place// &
+               ': ''trace_steps'' in &output cannot be combined with ''vanish_at'' in &wall, because a trace has '// &
+               'the same boxes in all steps')
+         end associate
+      end if
       if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then
          associate (group => instances(index_of_instance(instances, 'guards')))
             call raise(error, input_error, group%values(row_of(group, 'energy'))%place// &
@@ -113,7 +126,8 @@ contains
       end associate
    end subroutine check_scene
 
-   !> Check the speeds of oscillations, and that motions are given either in &scene or in groups &motion.
+   !> Check the speeds of oscillations and the ends of motions, and that motions are given either in &scene or in
+   !> groups &motion.
    pure subroutine check_motions(settings, instances, error)
       type(settings_t), intent(in) :: settings
       type(instance_t), intent(in) :: instances(:)
@@ -133,6 +147,10 @@ contains
             if (motion%kind == 'oscillation') call require( &
                two_pi*motion%frequency*maxval(abs(motion%amplitude)) < speed_limit, too_fast, 'amplitude', &
                'frequency', instances(index_of_instance(instances, 'motion', motion%name)), error)
+            if (motion%end > 0.0_wp) call require( &
+               motion%end > motion%start .and. motion%end - motion%start >= 2.0_wp*motion%ramp, &
+               'must be behind ''start'' by at least twice', 'end', 'ramp', &
+               instances(index_of_instance(instances, 'motion', motion%name)), error)
          end associate
       end do
    end subroutine check_motions

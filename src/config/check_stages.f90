@@ -28,6 +28,9 @@ contains
          if (settings%motion(k)%stage /= '' .and. settings%motion(k)%start > 0.0_wp) call blame('motion', &
             settings%motion(k)%name, 'start', 'cannot be combined with ''stage'': the motion starts with its stage', &
             instances, error)
+         if (settings%motion(k)%stage /= '' .and. settings%motion(k)%end > 0.0_wp) call blame('motion', &
+            settings%motion(k)%name, 'end', 'cannot be combined with ''stage'': the motion ends with its stage', &
+            instances, error)
       end do
       do k = 1, size(settings%wall)
          if (settings%wall(k)%outline == 'result' .and. settings%scene%name /= 'result') call blame('wall', &

@@ -13,6 +13,7 @@ module polydem_read_settings
    use polydem_exclusive_entries, only: resolve_exclusive_entries
    use polydem_fill_groups, only: fill_bench, fill_groups
    use polydem_group_instances, only: full_name, index_of_instance, instance_t, row_of
+   use polydem_kinds, only: wp
    use polydem_namelist_entries, only: bench_group, key_length, keys_of
    use polydem_namelist_tokens, only: source_t
    use polydem_source_locations, only: source_locations_t
@@ -143,6 +144,8 @@ contains
          motion%frequency = scene%motion_frequency
          motion%start = scene%motion_start
          motion%ramp = scene%motion_ramp
+         motion%end = 0.0_wp
+         motion%file = ''
       end associate
    end subroutine expand_short_motion
 

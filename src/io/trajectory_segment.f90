@@ -4,10 +4,12 @@
 !>     /cell        low, size: periodic cell (in a periodic cell)
 !>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
 !>                  image (in a periodic cell), slid and shift (in a sheared cell)
-!>     /walls       id; force and torque on the fixed bodies: one row per frame
+!>     /walls       id; force and torque on the fixed bodies, and present if walls vanish: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
 !>                  normal, force: one row per contact (optional)
 !>     /energy_balance      energy balance: one data set per entry, one row per frame (optional)
+!>     /series      step, time and named values: one data set per column, one row per step of the series up to the last
+!>                  frame of the segment (optional)
 !>     /provenance  origin of the file
 !>
 !> Indices count from 0. The normal of a contact is the integral of the outward normal over the part of the outline of
@@ -25,9 +27,10 @@ module polydem_trajectory_segment
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs, order_vertices
+   use polydem_series, only: series_t
    implicit none
    private
-   public :: write_bodies, add_frame, add_walls, add_contacts, add_balance
+   public :: write_bodies, add_frame, add_walls, add_contacts, add_balance, add_series
 
    !> Number of vertices that one rank writes at once, so that it needs little memory
    integer(ip), parameter :: vertices_at_once = 100000_ip
@@ -213,6 +216,9 @@ contains
       call file%write('/walls/force', force, error, 'N/m', 'forces of the other bodies on each fixed body', &
                       rows=one_row)
       call file%write('/walls/torque', torque, error, 'N', 'torques about its centre of mass', rows=one_row)
+      if (allocated(bodies%gone)) call file%write( &
+         '/walls/present', int(pack(merge(0, 1, bodies%gone(:bodies%n)), bodies%fixed(:bodies%n)), bp), error, '1', &
+         '1: present, 0: its wall has vanished', rows=one_row)
    end subroutine add_walls
 
    !> Add the contacts of a frame.
@@ -281,5 +287,24 @@ contains
                          trim(row%meaning(k)), rows=one_row)
       end do
    end subroutine add_balance
+
+   !> Add the rows of a series that are kept.
+   subroutine add_series(file, series, error)
+      type(hdf5_file_t), intent(inout) :: file
+      !> Rows, the same on all ranks
+      type(series_t), intent(in) :: series
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      if (series%n == 0) return
+      call file%write('/series/step', series%step(:series%n), error, '1', 'number of the time step', rows=many_rows)
+      call file%write('/series/time', series%time(:series%n), error, 's', 'simulated time', rows=many_rows)
+      do k = 1, size(series%row%name)
+         associate (row => series%row)
+            call file%write('/series/'//trim(row%name(k)), series%value(k, :series%n), error, trim(row%unit(k)), &
+                            trim(row%meaning(k)), rows=many_rows)
+         end associate
+      end do
+   end subroutine add_series
 
 end module polydem_trajectory_segment

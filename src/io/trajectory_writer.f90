@@ -19,8 +19,9 @@ module polydem_trajectory_writer
    use polydem_named_values, only: named_values_t
    use polydem_provenance, only: provenance_t, write_provenance
    use polydem_result_files, only: open_suffix, segment_path
+   use polydem_series, only: series_t
    use polydem_time_limit, only: time_limit_t
-   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_walls, write_bodies
+   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_series, add_walls, write_bodies
    implicit none
    private
    public :: trajectory_writer_t
@@ -85,7 +86,7 @@ contains
 
    !> Write a frame and flush it. After a failure the segment keeps its temporary name. Either all frames have
    !> `contacts` or none; likewise for `row`.
-   subroutine write_frame(self, step, time, bodies, error, contacts, row, manifest)
+   subroutine write_frame(self, step, time, bodies, error, contacts, row, manifest, series)
       class(trajectory_writer_t), intent(inout) :: self
       !> Number of the step
       integer(lp), intent(in) :: step
@@ -100,23 +101,28 @@ contains
       type(named_values_t), intent(in), optional :: row
       !> Manifest of the result, to which segments are added; only that of the root rank is used
       type(manifest_t), intent(inout), optional :: manifest
+      !> Rows of the series since the last frame, which are written before this frame and dropped
+      type(series_t), intent(inout), optional :: series
       type(time_limit_t) :: limit
       integer(ip) :: number
+      integer(lp) :: room
 
       number = merge(self%number, self%number + 1_ip, self%is_open)
-      if (self%comm%size > 1_ip) call limit%set(segment_path(self%folder, number)//open_suffix, self%comm%rank, &
-                                                room_for(bodies))
+      room = room_for(bodies)
+      if (present(series)) room = room + room_for_series(series)
+      if (self%comm%size > 1_ip) call limit%set(segment_path(self%folder, number)//open_suffix, self%comm%rank, room)
       if (self%is_open) then
-         call reserve_on_all_ranks(self%comm, segment_path(self%folder, self%number)//open_suffix, room_for(bodies), &
-            error)
+         call reserve_on_all_ranks(self%comm, segment_path(self%folder, self%number)//open_suffix, room, error)
       else
-         call open_segment(self, bodies, error, manifest)
+         call open_segment(self, bodies, room, error, manifest)
       end if
+      if (.not. allocated(error) .and. present(series)) call write_series(self, bodies, series, error)
       if (.not. allocated(error)) call fill_frame(self, step, time, bodies, error, contacts, row)
       if (allocated(error)) then
          call self%file%abandon(error)
          self%is_open = .false.
       else
+         if (present(series)) call series%drop_rows(step)
          if (self%n_frames == 0_ip) self%steps(1) = step
          self%steps(2) = step
          self%n_frames = self%n_frames + 1_ip
@@ -166,9 +172,11 @@ contains
    end subroutine close_trajectory
 
    !> Create the next segment and write the bodies to it.
-   subroutine open_segment(self, bodies, error, manifest)
+   subroutine open_segment(self, bodies, room, error, manifest)
       type(trajectory_writer_t), intent(inout) :: self
       type(bodies_t), intent(in) :: bodies
+      !> Upper bound of the disk space of its first frame [B]
+      integer(lp), intent(in) :: room
       type(error_t), allocatable, intent(inout) :: error
       type(manifest_t), intent(inout), optional :: manifest
       character(len=:), allocatable :: path
@@ -182,13 +190,33 @@ contains
          if (.not. allocated(error)) call self%file%create(path, error)
          call write_provenance(self%file, 'segment of a trajectory by polydem', self%provenance, error)
       end if
-      call open_on_all_ranks(self%comm, self%file, path, room_for(bodies), error)
+      call open_on_all_ranks(self%comm, self%file, path, room, error)
       if (allocated(error)) return
       self%is_open = .true.
-      ! Chunks of contacts are then small enough for loose grains, and large enough for dense packings.
-      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp)/8_lp)
+      call expect_contacts(self, bodies)
       call write_bodies(self%file, self%comm, bodies, error)
    end subroutine open_segment
+
+   !> Choose the size of chunks such that it is small enough for the contacts of loose grains, and large enough for
+   !> those of dense packings.
+   subroutine expect_contacts(self, bodies)
+      type(trajectory_writer_t), intent(inout) :: self
+      type(bodies_t), intent(in) :: bodies
+
+      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp)/8_lp)
+   end subroutine expect_contacts
+
+   !> Write the rows of a series, in chunks of the size that the segment will probably need.
+   subroutine write_series(self, bodies, series, error)
+      type(trajectory_writer_t), intent(inout) :: self
+      type(bodies_t), intent(in) :: bodies
+      type(series_t), intent(in) :: series
+      type(error_t), allocatable, intent(inout) :: error
+
+      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(series%n, lp))
+      call add_series(self%file, series, error)
+      call expect_contacts(self, bodies)
+   end subroutine write_series
 
    !> Upper bound of the disk space of one frame, including the shapes written before the first frame [B]. A body has
    !> about ten vertices of 16 bytes, 80 bytes per frame, and two or three contacts of 72 bytes. A new chunk of each
@@ -198,6 +226,14 @@ contains
 
       room_for = 2000000_lp + 1000_lp*int(bodies%n_all, lp)
    end function room_for
+
+   !> Upper bound of the disk space of the rows of a series, with a new chunk of each column [B]
+   pure integer(lp) function room_for_series(series) result(room)
+      type(series_t), intent(in) :: series
+
+      room = 0_lp
+      if (series%n > 0) room = (8_lp*int(series%n, lp) + 20000_lp)*int(size(series%value, 1) + 2, lp)
+   end function room_for_series
 
    !> Close the open segment, flush it to disk, rename it and mark it as closed in the manifest.
    subroutine close_segment(self, error, manifest)

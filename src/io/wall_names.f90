@@ -15,7 +15,7 @@ contains
    !> Text of the walls with their names and the identifiers of their bodies
    pure function wall_names_text(walls) result(text)
       !> The walls
-      type(wall_bodies_t), intent(in) :: walls(:)
+      class(wall_bodies_t), intent(in) :: walls(:)
       character(len=:), allocatable :: text
       integer :: first, k, last
 

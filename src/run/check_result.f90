@@ -9,7 +9,7 @@ module polydem_check_result
    use polydem_log, only: log_t
    use polydem_manifest, only: entry_t, manifest_t
    use polydem_result_files, only: checkpoint_path, complete_name, forms_of, manifest_name, n_checkpoints, name_in, &
-      overlaps_name, profile_name, segment_number, steps_name, trace_name
+      overlaps_name, profile_name, segment_number, series_name, steps_name, trace_name
    use polydem_strings, only: to_text, counted
    implicit none
    private
@@ -164,7 +164,7 @@ contains
       character(len=*), intent(in) :: name
 
       gets_closed = segment_number(name) > 0_ip .or. name == profile_name .or. name == trace_name .or. &
-                    name == steps_name .or. name == overlaps_name
+                    name == steps_name .or. name == overlaps_name .or. name == series_name
    end function gets_closed
 
    !> Count a file and write its line.

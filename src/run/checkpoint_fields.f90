@@ -1,9 +1,10 @@
 !> The list of fields of a checkpoint: the bodies, and all other state that outlives a time step and does not follow
 !> from the namelist.
 !>
-!> A checkpoint does not hold motions (functions of time), contacts (computed by the next step) or the state of
-!> neighbour finders. After a restart the first search starts without pairs. The pairs that it finds again get their
-!> contact history. A hash of the bodies at the start guards against the checkpoint of another run.
+!> A checkpoint does not hold motions (functions of time, of which tables are compared by a hash), contacts (computed by
+!> the next step) or the state of neighbour finders. After a restart the first search starts without pairs. The pairs
+!> that it finds again get their contact history. A hash of the bodies at the start guards against the checkpoint of
+!> another run.
 module polydem_checkpoint_fields
    use polydem_begin_stage, only: continue_stages
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
@@ -19,6 +20,9 @@ module polydem_checkpoint_fields
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
+   use polydem_vanishing_walls, only: find_release
+   use polydem_wall, only: has_table, hash_of_tables
+   use polydem_wall_load, only: serialize_loads
    implicit none
    private
    public :: attempts_t, serialize_run, serialize_progress, read_pairs
@@ -87,6 +91,7 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
+      integer :: k
 
       call serialize_progress(serializer, simulation%step, attempts)
       call serialize_monitor(monitor, serializer)
@@ -94,6 +99,8 @@ contains
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
+         if (any([(has_table(s%walls(k)), k=1, size(s%walls))])) call serializer%match('/run/motion_tables', &
+            [(hash_of_tables(s%walls(k)), k=1, size(s%walls))], '1', 'hash of the tables of motions')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
                            'ended, contacts without direction')
@@ -102,6 +109,13 @@ contains
          call serializer%seconds_field('/run/stage_least', s%timers%least, 'shortest time in a step')
          call serializer%seconds_field('/run/stage_most', s%timers%most, 'longest time in a step')
          if (s%settings%output%energy_balance) call serialize_balance(s%energy_balance, serializer)
+         if (.not. serializer%is_reading) call find_release(s)
+         call s%named%serialize_gates(serializer)
+         if (allocated(s%loads)) call serialize_loads(s%loads, serializer)
+         if (s%settings%output%series_interval > 0.0_wp) then
+            call s%record%serialize(serializer)
+            call s%series%serialize(serializer)
+         end if
       end associate
    end subroutine serialize_global
 

@@ -5,8 +5,9 @@ module polydem_claim_folder
    use polydem_folder_lock, only: folder_lock_t, lock_path
    use polydem_kinds, only: ip
    use polydem_manifest, only: longest_name, manifest_t
+   use polydem_motion_file, only: table_path
    use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
-      steps_name, trace_name
+      series_name, steps_name, trace_name
    use polydem_set_aside, only: set_aside
    use polydem_settings, only: output_settings_t, settings_t
    implicit none
@@ -62,23 +63,30 @@ contains
       end if
    end subroutine claim_folder
 
-   !> Paths of the input files of a run: namelist, bodies file, packings; empty where the scene reads no such file
+   !> Paths of the input files of a run: namelist, bodies file, packings, tables; empty where the scene reads no such
+   !> file
    function input_paths(settings) result(inputs)
       type(settings_t), intent(in) :: settings
       character(len=:), allocatable :: inputs(:)
       integer :: k, longest_path
 
-      associate (file => settings%file, scene => settings%scene, grains => settings%grains)
+      associate (file => settings%file, scene => settings%scene, grains => settings%grains, motions => settings%motion)
          longest_path = max(len(file), len(scene%bodies_file), len(scene%packing))
          do k = 1, size(grains)
             longest_path = max(longest_path, len(grains(k)%packing))
          end do
-         allocate (character(len=longest_path) :: inputs(3 + size(grains)))
+         do k = 1, size(motions)
+            longest_path = max(longest_path, len(table_path(settings, motions(k))))
+         end do
+         allocate (character(len=longest_path) :: inputs(3 + size(grains) + size(motions)))
          inputs(1) = file
          inputs(2) = scene%bodies_file
          inputs(3) = scene%packing
          do k = 1, size(grains)
             inputs(3 + k) = grains(k)%packing
+         end do
+         do k = 1, size(motions)
+            inputs(3 + size(grains) + k) = table_path(settings, motions(k))
          end do
       end associate
    end function input_paths
@@ -98,6 +106,7 @@ contains
       if (output%trace_steps > 0_ip) names = [character(len=longest_name) :: names, trace_name]
       if (output%step_profile) names = [character(len=longest_name) :: names, steps_name]
       if (has_deep_contacts) names = [character(len=longest_name) :: names, overlaps_name]
+      if (output%csv) names = [character(len=longest_name) :: names, series_name]
    end subroutine list_output_names
 
 end module polydem_claim_folder

@@ -27,6 +27,8 @@ contains
       call log%write_line('work [J/m]: elastic '//to_text(balance%elastic_work, 4)//', damping '// &
                           to_text(balance%damping_work, 4)//', friction '//to_text(balance%friction_work, 4)// &
                           ', walls '//to_text(balance%wall_work, 4))
+      if (balance%has_loads) call log%write_line('            loads '//to_text(balance%load_work, 4)// &
+         ', damping of their walls '//to_text(balance%load_damping_work, 4))
       angular = ''
       if (.not. simulation%bodies%cell%is_periodic) &
          angular = ', angular momentum '//to_text(balance%relative_angular_residual, 2)

@@ -59,6 +59,7 @@ contains
       call warn_of_speeds(simulation, measures, warnings)
       call warn_of_fixed_overlaps(simulation, warnings)
       call warn_of_regions(simulation%settings, warnings)
+      call warn_of_tables(simulation, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
@@ -68,6 +69,26 @@ contains
       end do
       n = size(warnings, kind=lp)
    end subroutine warn_of_risks
+
+   !> Warn of tables of motions that end before the run does.
+   subroutine warn_of_tables(simulation, warnings)
+      type(simulation_t), intent(in) :: simulation
+      type(text_t), allocatable, intent(inout) :: warnings(:)
+      real(wp) :: last
+      integer :: j, k
+
+      do k = 1, size(simulation%walls)
+         do j = 1, size(simulation%walls(k)%motions)
+            associate (motion => simulation%walls(k)%motions(j), duration => simulation%settings%integrate%duration)
+               if (.not. allocated(motion%table)) cycle
+               last = motion%start + motion%table%time(size(motion%table%time))
+               if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
+                  'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
+                  to_text(duration, 3)//' s; from then on its bodies rest in the last pose')
+            end associate
+         end do
+      end do
+   end subroutine warn_of_tables
 
    !> Warn of lengths, densities and gravity that are implausible in SI units.
    subroutine warn_of_units(simulation, measures, warnings)

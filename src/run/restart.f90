@@ -375,11 +375,14 @@ contains
          call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, s%bodies%cell)
          if (.not. s%comm%is_root()) then
             s%sums = 0_lp
+            call s%record%clear()
             s%timers = timers_t()
             s%neighbours%finder%work%value = 0_lp
             s%neighbours%finder%work%seconds = 0.0_dp
          end if
       end associate
+      ! Segments behind the checkpoint have some of its rows.
+      call simulation%series%drop_rows(earlier%last_frame)
       attempts%attempts = attempts%attempts + 1_lp
       call log%write_line('attempt    '//to_text(attempts%attempts))
       if (revision /= earlier%revision) call log%write_line('warning: another revision of this program ('// &

@@ -81,6 +81,8 @@ module polydem_run
       type(folder_lock_t) :: lock
       !> Steps between frames, not always a whole number; 0: no interval
       real(dp) :: frame_steps = 0.0_dp
+      !> Steps between rows of the series, not always a whole number; 0: no series
+      real(dp) :: series_steps = 0.0_dp
       !> Steps between lines of the log, not always a whole number
       real(dp) :: log_steps = 0.0_dp
       !> Monitor

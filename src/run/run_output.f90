@@ -14,8 +14,10 @@ module polydem_run_output
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
    use polydem_monitor, only: check_step, needs_contacts, report_pending_warnings, write_warning_counts
    use polydem_profile_file, only: write_profile
-   use polydem_result_files, only: profile_name
+   use polydem_result_files, only: profile_name, series_name
    use polydem_run, only: run_t
+   use polydem_series_csv, only: write_series_csv
+   use polydem_series_row, only: collect_row
    use polydem_simulation, only: simulation_t, time_of, compute_balance
    use polydem_simulation_counters, only: count_contacts, report_counters
    use polydem_strings, only: to_text
@@ -59,6 +61,7 @@ contains
             end if
             if (s%stages%value >= 0.0_wp) call run%log%write_line('           '//condition_text(s))
          end if
+         call record_row(run)
          if (frame_due) call write_frame(run, error)
          if (s%stages%number == 0_ip) then
             call run%log%show_progress(s%step, s%n_steps)
@@ -127,6 +130,18 @@ contains
       call name_terms(run%balance, .not. run%simulation%bodies%cell%is_periodic, run%row)
    end subroutine update_balance
 
+   !> Keep a row of the series if one is due, unless a file of an earlier attempt has it; collective.
+   subroutine record_row(run)
+      type(run_t), intent(inout) :: run
+
+      associate (s => run%simulation)
+         if (.not. run%series_steps > 0.0_dp .or. s%step <= run%earlier%last_frame) return
+         if (.not. is_due(s%step, s%n_steps, run%series_steps)) return
+         call collect_row(s)
+         call s%series%keep_row(s%step, real(time_of(s), dp))
+      end associate
+   end subroutine record_row
+
    !> Write a frame, unless an earlier attempt wrote it; collective.
    subroutine write_frame(run, error)
       type(run_t), intent(inout) :: run
@@ -137,9 +152,11 @@ contains
          call complete_wall_forces(run%comm, s%walk%walls, s%bodies)
          ! The row has no entries if the run computes no energy balance.
          if (output%contacts) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, run%manifest)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, run%manifest, &
+                                            s%series)
          else
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, manifest=run%manifest)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, manifest=run%manifest, &
+                                            series=s%series)
          end if
          run%last_frame = s%step
       end associate
@@ -188,6 +205,7 @@ contains
          call report_pending_warnings(run%monitor, s, run%log)
          if (allocated(error)) call write_last_frame(run, error%code, write_error)
          call run%trajectory%close(write_error, run%manifest)
+         if (s%settings%output%csv .and. run%comm%is_root()) call write_csv(run, write_error)
          call run%recorder%close(run%log, run%manifest, write_error)
          call run%checkpoints%close(run%log)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
@@ -207,6 +225,18 @@ contains
       call run%comm%all_reduce_error(error)
    end subroutine finish
 
+   !> Write the series as comma-separated values. Called by the root rank only.
+   subroutine write_csv(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call run%manifest%reopen(run%folder//'/'//series_name, error)
+      call write_series_csv(run%folder//'/'//series_name, run%folder, run%trajectory%number, &
+                            run%simulation%series%row, error)
+      call run%manifest%close_file(run%folder//'/'//series_name, error)
+   end subroutine write_csv
+
    !> Write the distribution of the time of each stage over the ranks; collective.
    subroutine write_rank_times(run, log)
       type(run_t), intent(inout) :: run
@@ -221,13 +251,14 @@ contains
 
    !> Convert the intervals of frames and log lines to steps.
    subroutine choose_intervals(run)
-      !> The run; `frame_steps` and `log_steps` are set
+      !> The run; `frame_steps`, `log_steps` and `series_steps` are set
       type(run_t), intent(inout) :: run
       real(dp) :: deviation
 
       associate (s => run%simulation, output => run%simulation%settings%output)
          run%frame_steps = in_steps(output%frame_interval, s%dt)
          run%log_steps = in_steps(output%log_interval, s%dt)
+         run%series_steps = in_steps(output%series_interval, s%dt)
          if (.not. run%log_steps > 0.0_dp) run%log_steps = max(1.0_dp, real(s%n_steps, dp)/default_lines)
          deviation = abs(run%frame_steps - anint(run%frame_steps))
          if (real(output%frame_interval, dp) < real(s%dt, dp)*(1.0_dp - 1.0e-6_dp) .and. run%frame_steps > 0.0_dp) then

@@ -10,6 +10,7 @@ module polydem_start
    use polydem_global_hash, only: hash_scene
    use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, wp
+   use polydem_name_walls, only: assign_loads, name_walls
    use polydem_restart, only: restore, serialize_earlier
    use polydem_process_limits, only: check_threads
    use polydem_result_files, only: checkpoint_path, n_checkpoints
@@ -23,6 +24,7 @@ module polydem_start
    use polydem_start_simulation, only: place_bodies, start_forces
    use polydem_strings, only: to_text
    use polydem_thread_choice, only: choose_threads, thread_choice_t
+   use polydem_wall_bodies, only: wall_bodies_t
    implicit none
    private
    public :: new_simulation, build_start, recall, open_output
@@ -43,16 +45,19 @@ contains
       !> Time step of an earlier attempt, which the simulation keeps unless the settings have one [s]; 0: there is none
       real(wp), intent(in), optional :: former_step
       class(communicator_t), allocatable :: ranks
+      type(wall_bodies_t), allocatable :: of_result(:)
 
       call choose_communicator(ranks, comm)
       if (present(former_step)) self%dt = former_step
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       if (settings%scene%name == 'result') then
-         call read_start(settings, ranks, self%bodies, self%named_walls, error)
-         if (.not. allocated(error)) call assign_motions(settings, self%bodies, self%named_walls, self%walls, error)
+         call read_start(settings, ranks, self%bodies, of_result, error)
+         if (.not. allocated(error)) call assign_motions(settings, self%bodies, of_result, self%walls, error)
+         if (.not. allocated(error)) call name_walls(settings, self%bodies, of_result, self%walls, self%named)
+         if (.not. allocated(error)) call assign_loads(settings, of_result, self%loads)
       else
-         call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size, self%named_walls)
+         call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size, self%named, self%loads)
       end if
       call ranks%all_reduce_error(error)
       if (present(threads) .and. .not. allocated(error)) &

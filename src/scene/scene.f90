@@ -16,6 +16,7 @@ module polydem_scene
    use polydem_hopper, only: make_hopper
    use polydem_incline, only: make_incline
    use polydem_kinds, only: ip, lp, wp
+   use polydem_motion_file, only: read_motion_table
    use polydem_outlines, only: pi
    use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: parts_t
@@ -26,8 +27,11 @@ module polydem_scene
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_stack, only: make_stack
    use polydem_strings, only: to_text
+   use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls
+   use polydem_named_walls, only: named_walls_t
    use polydem_wall, only: new_wall, wall_t
    use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall_load, only: wall_load_t
    use polydem_wall_outlines, only: is_anticlockwise
    implicit none
    private
@@ -42,20 +46,22 @@ module polydem_scene
 contains
 
    !> Make the bodies of a scene and its moving walls.
-   subroutine build_scene(settings, bodies, walls, error, rank, n_ranks, named)
+   subroutine build_scene(settings, bodies, walls, error, rank, n_ranks, named, loads)
       !> Settings: groups &scene, &motion and &forces (gravity and stiffness, for blocks at rest)
       type(settings_t), intent(in) :: settings
       !> Bodies at the start; free bodies come first unless a bodies file has another order
       type(bodies_t), intent(out) :: bodies
-      !> Fixed bodies with prescribed motions; each wall has bodies with the same motions
+      !> Fixed bodies with prescribed motions or loads; each wall has bodies with the same motions and loads
       type(wall_t), allocatable, intent(out) :: walls(:)
       !> Error in the namelist or the bodies file
       type(error_t), allocatable, intent(inout) :: error
       !> Number of this rank, from 0, and number of ranks; each rank makes all fixed bodies and its share of the free
       !> bodies. Default: one rank
       integer(ip), intent(in), optional :: rank, n_ranks
-      !> Walls with names
-      type(wall_bodies_t), allocatable, intent(out), optional :: named(:)
+      !> Walls with their names
+      type(named_walls_t), intent(inout), optional :: named
+      !> Loads on them; not allocated if there are none
+      type(wall_load_t), allocatable, intent(inout), optional :: loads(:)
       type(body_list_t) :: list
       type(parts_t) :: parts
       type(wall_bodies_t), allocatable :: walls_of_parts(:)
@@ -76,7 +82,9 @@ contains
             overrides_of(settings, 'grains')//overrides_of(settings, 'wall')
       end if
       if (.not. allocated(error)) call assign_motions(settings, bodies, walls_of_parts, walls, error)
-      if (present(named)) call move_alloc(walls_of_parts, named)
+      if (allocated(error)) return
+      if (present(named)) call name_walls(settings, bodies, walls_of_parts, walls, named)
+      if (present(loads)) call assign_loads(settings, walls_of_parts, loads)
    end subroutine build_scene
 
    !> Beginning of a message about one of all bodies
@@ -225,7 +233,7 @@ contains
       reversed = corners(:, size(corners, 2):1:-1)
    end function reversed
 
-   !> Find the bodies of each prescribed motion, and make walls of those with the same motions.
+   !> Find the bodies of each prescribed motion and load, and make walls of those with the same ones.
    subroutine assign_motions(settings, bodies, named, walls, error)
       type(settings_t), intent(in) :: settings
       type(bodies_t), intent(in) :: bodies
@@ -236,13 +244,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       ! Slots of the fixed bodies; the wall of each one, 0 if it is at rest; the first body of each wall
       integer(ip), allocatable :: slots(:), wall_of(:), first(:)
-      ! Whether a motion moves a body, (motion, fixed body)
+      ! Whether a motion, or a load behind the motions, moves a body, (motion or load, fixed body)
       logical, allocatable :: moves(:, :)
       type(motion_t), allocatable :: motions(:)
-      integer(ip) :: k, n, s, w
+      integer(ip) :: k, n, n_motions, s, w
 
       slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
-      allocate (moves(size(settings%motion), size(slots)), motions(size(settings%motion)))
+      n_motions = size(settings%motion, kind=ip)
+      allocate (moves(n_motions + size(settings%load), size(slots)), motions(n_motions))
       do k = 1_ip, size(motions, kind=ip)
          associate (motion => settings%motion(k))
             call find_moved(ids_of(motion, named), bodies, slots, moves(k, :), error)
@@ -254,6 +263,20 @@ contains
          motions(k) = prescribed(settings%motion(k))
          motions(k)%stage = number_of_stage(settings, settings%motion(k)%stage)
          if (motions(k)%stage > 0_ip) motions(k)%start = huge(1.0_wp)
+         if (motions(k)%kind /= 'table') cycle
+         allocate (motions(k)%table)
+         call read_motion_table(settings, settings%motion(k), motions(k)%table, error)
+         if (allocated(error)) return
+      end do
+      do k = 1_ip, size(settings%load, kind=ip)
+         associate (name => settings%load(k)%wall)
+            call find_moved(ids_of_wall(name, named), bodies, slots, moves(n_motions + k, :), error)
+            if (allocated(error)) then
+               error%message = place_of(settings, 'wall.'//name, 'bodies')//": 'bodies' in &wall "//name//': '// &
+                  error%message
+               return
+            end if
+         end associate
       end do
       allocate (wall_of(size(slots)), first(size(slots)))
       wall_of = 0_ip
@@ -270,7 +293,8 @@ contains
       end do
       allocate (walls(n))
       do w = 1_ip, n
-         call new_wall(walls(w), pack(motions, moves(:, first(w))), bodies, pack(slots, wall_of == w))
+         call new_wall(walls(w), pack(motions, moves(:n_motions, first(w))), bodies, pack(slots, wall_of == w))
+         walls(w)%is_loaded = any(moves(n_motions + 1:, first(w)))
       end do
    end subroutine assign_motions
 
@@ -298,6 +322,9 @@ contains
       prescribed%frequency = 2.0_wp*pi*motion%frequency
       prescribed%start = motion%start
       prescribed%ramp = motion%ramp
+      if (.not. motion%end > 0.0_wp) return
+      prescribed%end = motion%end
+      prescribed%ramp_down = motion%ramp
    end function prescribed
 
    !> Identifiers of the bodies that a motion moves; none if it moves all fixed bodies
@@ -305,12 +332,9 @@ contains
       type(motion_settings_t), intent(in) :: motion
       type(wall_bodies_t), intent(in) :: named(:)
       integer(ip), allocatable :: ids(:)
-      integer :: w
 
       ids = motion%bodies
-      do w = 1, size(named)
-         if (motion%wall == named(w)%name) ids = named(w)%id
-      end do
+      if (motion%wall /= '') ids = ids_of_wall(motion%wall, named)
    end function ids_of
 
    !> Beginning of a message about the bodies of a motion: they are entries of a wall, of &motion, or of &scene if the

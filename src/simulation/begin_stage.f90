@@ -154,9 +154,9 @@ contains
          integer :: j, k
 
          centre = 0.0_wp
-         do k = 1, size(self%named_walls)
-            if (self%named_walls(k)%name /= name) cycle
-            associate (id => self%named_walls(k)%id)
+         do k = 1, size(self%named%wall)
+            if (self%named%wall(k)%name /= name) cycle
+            associate (id => self%named%wall(k)%id)
                do j = 1, size(id)
                   centre = centre + self%bodies%position(:, place_in(self%bodies%id, id(j)))/real(size(id), wp)
                end do

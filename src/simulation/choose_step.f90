@@ -12,6 +12,7 @@ module polydem_choose_step
    use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes
    use polydem_strings, only: to_text
+   use polydem_wall_load, only: wall_mobilities
    implicit none
    private
    public :: choose_step
@@ -39,7 +40,7 @@ contains
       call choose_parts(self%settings%forces, law, pair_parameters(self%settings))
       call find_expected_speed(self)
       call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected%speed, stable, critical, &
-                                 depth, length, damped)
+                                 depth, length, damped, mobility_of_walls(self))
       has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
       call reduce_to_greatest(self%comm, has_free)
       limiting = 0_lp
@@ -111,5 +112,24 @@ contains
          if (short_number <= number) return
       end do
    end function short_number
+   !> Greatest mobility of a wall that yields [m/kg], and greatest product of mobility and length of the wall [m2/kg]
+   pure function mobility_of_walls(self) result(greatest)
+      type(simulation_t), intent(in) :: self
+      real(wp) :: greatest(2), extent(2, 2)
+      real(wp), allocatable :: mobility(:)
+      integer :: k
+
+      greatest = 0.0_wp
+      if (.not. allocated(self%loads)) return
+      mobility = wall_mobilities(self%loads, self%named, self%bodies)
+      do k = 1, size(self%loads)
+         associate (w => self%loads(k)%wall)
+            extent(:, 1) = self%named%extent(w, 1, self%bodies)
+            extent(:, 2) = self%named%extent(w, 2, self%bodies)
+            if (size(self%named%wall(w)%slots) > 0) greatest = max(greatest, &
+               mobility(self%named%wall(w)%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
+         end associate
+      end do
+   end function mobility_of_walls
 
 end module polydem_choose_step

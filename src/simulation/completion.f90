@@ -42,6 +42,7 @@ contains
       if (n > 0_ip) done = self%bodies%free(n)
       call keep_fixed(done + 1_ip, self%bodies%n, self%force_sums, self%bodies)
       if (self%settings%output%energy_balance) call count_step(self%energy_balance)
+      if (allocated(self%record%sums)) call self%record%accumulate(self%named, self%bodies, self%walk%walls, 1.0_wp)
       associate (moving => self%motion_check%moving)
          do k = n + 1_ip, size(moving, kind=ip)
             good = good .and. move_within_limit(self%motion_check, self%bodies, moving(k), moving(k), self%dt)

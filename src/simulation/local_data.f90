@@ -32,6 +32,8 @@ contains
       !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
       real(wp), intent(in), optional :: median_diameter
 
+      call self%named%find_slots(self%bodies)
+      call self%named%mark_gone(self%bodies)
       call find_folds(self%bodies)
       call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
       if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)

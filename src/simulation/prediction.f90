@@ -13,9 +13,10 @@ module polydem_prediction
    use polydem_thread_changes, only: part
    use polydem_timers, only: block_clock_t
    use polydem_wall, only: move_wall
+   use polydem_wall_load, only: carry_walls, correct_loads, predict_loads
    implicit none
    private
-   public :: predict_border, predict_bodies, move_walls
+   public :: predict_border, predict_bodies, move_walls, yield_walls
 
 contains
 
@@ -35,6 +36,7 @@ contains
 
       call self%flight%begin_step(self%neighbours%pairs, self%bodies%n)
       call predict_and_bound(self, good, has_left, clock)
+      if (allocated(self%loads)) call predict_loads(self%dt, self%loads)
       call move_walls(self, time_of(self))
       do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%motion_check%moving, kind=ip)
          good = good .and. have_valid_poses(self%bodies, self%motion_check%moving(k), self%motion_check%moving(k))
@@ -179,7 +181,7 @@ contains
                                                        self%domain%reference)
    end subroutine bound_block
 
-   !> Move the bodies with prescribed motion to their poses at a given time.
+   !> Move the bodies with prescribed motion to their poses at a given time, and displace them by loads.
    subroutine move_walls(self, time)
       type(simulation_t), intent(inout) :: self
       !> Simulated time [s]
@@ -190,6 +192,18 @@ contains
          call move_wall(self%walls(k), time, self%bodies)
          if (self%bodies%cell%is_periodic) call put_into_cell(self%bodies, self%walls(k)%slots)
       end do
+      if (allocated(self%loads)) call carry_walls(self%loads, self%named, self%bodies)
    end subroutine move_walls
+
+   !> Find the velocities of the walls that yield to loads from the contacts. Their places do not change. Collective.
+   subroutine yield_walls(self, dt)
+      !> The simulation with loads, and with the contacts of this step
+      type(simulation_t), intent(inout) :: self
+      !> Time step; 0 at the start [s]
+      real(wp), intent(in) :: dt
+
+      call correct_loads(self%loads, self%comm, dt, time_of(self), self%named, self%bodies, self%walk%walls)
+      call move_walls(self, time_of(self))
+   end subroutine yield_walls
 
 end module polydem_prediction

@@ -23,7 +23,7 @@ module polydem_replace_bodies
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: replace_bodies, settle_bodies
+   public :: replace_bodies, settle_bodies, hold_history
 
 contains
 
@@ -106,6 +106,7 @@ contains
    !> Hold the contact history of the pairs until they are found again, unless it is held already. Those of bodies that
    !> leave will not be found, and end.
    subroutine hold_history(self)
+      !> The simulation between two steps
       type(simulation_t), intent(inout) :: self
 
       if (allocated(self%received_history)) return

@@ -15,13 +15,17 @@ module polydem_simulation
    use polydem_motion_check, only: motion_check_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, lp, wp
+   use polydem_named_walls, only: named_walls_t
    use polydem_neighbours, only: neighbours_t
    use polydem_packed_history, only: packed_history_t
    use polydem_run_stages, only: run_stages_t
+   use polydem_series, only: series_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
    use polydem_wall, only: wall_t
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall_energy, only: add_loads
+   use polydem_wall_load, only: energies_of_loads, wall_load_t
+   use polydem_wall_record, only: wall_record_t
    use polydem_walk_results, only: walk_results_t
    implicit none
    private
@@ -71,10 +75,16 @@ module polydem_simulation
       type(domain_t) :: domain
       !> Bodies
       type(bodies_t) :: bodies
-      !> Fixed bodies with prescribed motions; other fixed bodies are at rest
+      !> Fixed bodies with prescribed motions or loads; other fixed bodies are at rest
       type(wall_t), allocatable :: walls(:)
-      !> Walls with names; not allocated if nobody has named them
-      type(wall_bodies_t), allocatable :: named_walls(:)
+      !> Walls by name
+      type(named_walls_t) :: named
+      !> Loads on named walls; not allocated if there are none
+      type(wall_load_t), allocatable :: loads(:)
+      !> Record of the named walls, if there is a series
+      type(wall_record_t) :: record
+      !> Rows of the series that no file has yet
+      type(series_t) :: series
       !> Maker of the bounding boxes
       type(box_maker_t) :: maker
       !> Bounding boxes
@@ -149,6 +159,7 @@ contains
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
                             self%force_sums, self%walk%walls, balance)
+      if (allocated(self%loads)) call add_loads(self%energy_balance, energies_of_loads(self%loads, self%dt), balance)
    end subroutine compute_balance
 
 end module polydem_simulation

@@ -10,12 +10,14 @@ module polydem_simulation_counters
 
 contains
 
-   !> Add up the counts of all ranks on the root rank, and reset them to zero on the other ranks. Collective.
+   !> Add up the counts of all ranks and the record of walls on the root rank, and reset them to zero on the other
+   !> ranks. Collective.
    subroutine collect_counts(self)
       type(simulation_t), intent(inout) :: self
       integer(lp), allocatable :: counts(:)
 
       if (self%comm%size == 1_ip) return
+      call self%record%collect(self%comm)
       associate (value => self%neighbours%finder%work%value, n => size(self%sums))
          counts = [self%sums, value]
          call self%comm%all_reduce_sum(counts)

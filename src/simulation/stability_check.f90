@@ -9,6 +9,7 @@ module polydem_stability_check
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_alone, stable_step_of_contacts
    use polydem_strings, only: to_text
+   use polydem_wall_load, only: wall_mobilities
    implicit none
    private
    public :: check_stability, check_suspects, find_stable_step, greatest_share
@@ -130,13 +131,14 @@ contains
       real(wp), intent(out) :: stable
       !> Index of the contact that limits it; 0 if this rank does not have it
       integer(ip), intent(out) :: critical
-      real(wp), allocatable :: numbers(:)
+      real(wp), allocatable :: numbers(:), yielding(:)
       real(wp) :: least(1)
 
       numbers = contact_numbers(self%bodies%n, self%walk%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
+      if (allocated(self%loads)) yielding = wall_mobilities(self%loads, self%named, self%bodies)
       call stable_step_of_contacts(self%law, self%integrator%stability(), self%bodies, numbers, self%contacts, &
-                                   stable, critical)
+                                   stable, critical, yielding)
       least = stable
       call reduce_to_least(self%comm, least)
       if (stable > least(1)) critical = 0_ip

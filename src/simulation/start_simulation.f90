@@ -13,17 +13,18 @@ module polydem_start_simulation
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
    use polydem_force_sums, only: force_sums_t
-   use polydem_global_reductions, only: find_median
+   use polydem_global_reductions, only: find_median, sum_exactly
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
    use polydem_local_data, only: limit_displacement, rebuild_local_data
-   use polydem_prediction, only: move_walls
+   use polydem_prediction, only: move_walls, yield_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
+   use polydem_wall_load, only: set_masses
    implicit none
    private
    public :: start_with_bodies, place_bodies, start_forces
@@ -66,6 +67,7 @@ contains
       call prepare_stages(self)
       call new_integrator(settings%integrate, self%integrator)
       call choose_all_fields(self)
+      if (allocated(self%loads)) call prepare_loads(self)
       call choose_step(self, error)
       if (allocated(error)) return
       call self%body_forces%configure(self%settings%forces)
@@ -98,6 +100,9 @@ contains
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call start_integration(self)
+      if (allocated(self%loads)) call yield_walls(self, 0.0_wp)
+      if (self%settings%output%series_interval > 0.0_wp) &
+         call self%record%start(self%named, self%bodies, self%walk%walls)
       if (self%settings%output%energy_balance) call start_energy_balance( &
          self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%force_sums, self%walk%walls)
       self%timers = timers_t()
@@ -115,6 +120,16 @@ contains
       end do
       call choose_body_forces(forces, self%body_forces)
    end subroutine choose_all_fields
+
+   !> Set the masses of walls that yield. Collective.
+   subroutine prepare_loads(self)
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: total
+
+      call self%named%find_slots(self%bodies)
+      call sum_exactly(self%comm, self%bodies%mass(self%bodies%free), total)
+      call set_masses(self%loads, self%named, self%bodies, total, self%settings%forces%stiffness)
+   end subroutine prepare_loads
 
    !> Set the accelerations at time 0: from all forces, or from all but those of contacts, depending on the scheme.
    subroutine start_integration(self)

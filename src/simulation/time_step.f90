@@ -11,12 +11,13 @@ module polydem_time_step
    use polydem_errors, only: error_t, raise, run_error
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
-   use polydem_prediction, only: predict_bodies, predict_border
+   use polydem_prediction, only: predict_bodies, predict_border, yield_walls
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
    use polydem_strings, only: to_text
    use polydem_timers, only: block_clock_t, stage_boxes, stage_decomposition, stage_forces, stage_integrate, &
       stage_neighbours, stage_overlap
+   use polydem_vanishing_walls, only: remove_walls
    use polydem_wall_terms, only: select_walls
    implicit none
    private
@@ -35,6 +36,8 @@ contains
       type(block_clock_t) :: clock
       logical :: has_left
 
+      call remove_walls(self, error)
+      if (allocated(error)) return
       self%step = self%step + 1_lp
       call begin_step(self%energy_balance)
       call shear_cell(self%bodies%cell, real(self%step - 1_lp, wp)*self%dt, time_of(self))
@@ -67,8 +70,11 @@ contains
          call add_other_forces(self, error)
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
-         if (self%settings%overlap%degenerate == 'stop') call self%comm%all_reduce_error(error)
+         ! Loads need all ranks.
+         if (self%settings%overlap%degenerate == 'stop' .or. allocated(self%loads)) &
+            call self%comm%all_reduce_error(error)
          if (allocated(error)) return
+         if (allocated(self%loads)) call yield_walls(self, self%dt)
          call complete_step(self, error)
          call timers%lap(stage_integrate)
       end associate

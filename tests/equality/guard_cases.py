@@ -88,11 +88,14 @@ VARIED = {
     "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84", "scene.bodies_file": None,
     "motion.one.bodies": "82, 84", "motion.one.pivot": "0.01, 0.02", "motion.one.rate": "1",
     "motion.one.velocity": "0.1, 0.2", "motion.one.amplitude": "1e-3, 0", "motion.one.frequency": "50",
-    "motion.one.start": "0.005", "motion.one.ramp": "0.01",
+    "motion.one.start": "0.005", "motion.one.ramp": "0.01", "motion.one.end": "0.02", "motion.one.file": None,
     "wall.one.from": "-0.2, -0.2", "wall.one.to": "0.2, -0.2", "wall.one.low": "-0.2, -0.2",
     "wall.one.high": "0.2, -0.11", "wall.one.angle": "3", "wall.one.centre": "0.01, 0", "wall.one.radius": "0.12",
     "wall.one.segments": "30", "wall.one.vertices": "-0.2, -0.3, 0.2, -0.3, 0, -0.15", "wall.one.thickness": "0.02",
-    "wall.one.bodies": None, "motion.one.wall": "one",
+    "wall.one.bodies": None, "wall.one.vanish_at": "0.01", "motion.one.wall": "one",
+    "load.one.wall": "one", "load.one.force": "20", "load.one.stress": "200", "load.one.width": "0.2",
+    "load.one.between": None, "load.one.torque": "1", "load.one.pivot": "0.01, 0.02", "load.one.mass": "2",
+    "load.one.damping_ratio": "0.1", "load.one.start": "0.005", "load.one.end": "0.015", "load.one.ramp": "0.01",
     "grains.one.low": "-0.05, -0.05", "grains.one.high": "0.05, 0.05", "grains.one.centre": "0.01, 0",
     "grains.one.radius": "0.08", "grains.one.vertices": "-0.05, -0.05, 0.05, -0.05, 0, 0.05", "grains.one.wall": "one",
     "grains.one.at": "0.01, 0", "grains.one.number": "30", "grains.one.number@at": None,
@@ -125,7 +128,7 @@ VARIED = {
     "decomposition.margin": "1e-3", "decomposition.imbalance": "2",
     "output.folder": None, "output.frame_interval": "0.002", "output.frames_per_segment": "3",
     "output.log_interval": "1e-3",
-    "output.trace_steps": "20", "output.trace_start": "0.01",
+    "output.series_interval": "1e-3", "output.trace_steps": "20", "output.trace_start": "0.01",
     "checkpoint.steps": "50", "checkpoint.interval": "0.01", "checkpoint.elapsed": None,
 }
 #: What an entry needs beside it to have an effect
@@ -142,11 +145,14 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
                                          "contact_pair.one.friction_coefficient": "0.6"},
           "contact_pair.one.damping_coefficient": {
               "material.one.density": "1000", "scene.material": "one", "forces.damping_coefficient": "0.1",
-              "contact_pair.one.materials": VARIED["contact_pair.one.materials"]}}
+              "contact_pair.one.materials": VARIED["contact_pair.one.materials"]},
+          "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
+          "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
              **dict.fromkeys(("motion.one.stage", "scene.start_from", "stage.one.wall", "stage.one.opposite"),
                              "check_stages.py"),
+             "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
              "cell.shear_ramp": "as cell.shear_rate", "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack",
@@ -154,7 +160,7 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
 UNTRIED = {("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
-           ("stage.one.until", "strain"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
+           ("stage.one.until", "strain"), ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
 
 #: Numbers of ranks of the program with MPI
 RANKS = (1, 2, 3)
@@ -253,7 +259,7 @@ def entry_cases(entries):
         condition, words = entry.condition or ("", ())
         known = [word for word in words if word in SCENES] or ["drum"]
         scene = known[next(turn) % len(known)] if condition == "scene.name" else "drum"
-        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall", "cell.")) else scene
+        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall", "cell.", "load.")) else scene
         base = dict(SCENES[scene])
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
             base[condition] = words[0]
@@ -265,6 +271,8 @@ def entry_cases(entries):
             base.setdefault(f"stage.{NAME}.until", "duration")
         if entry.name.startswith("motion."):
             base.setdefault(f"motion.{NAME}.kind", "rotation")
+        if entry.name.startswith("load."):
+            base = {f"load.{NAME}.wall": NAME, f"load.{NAME}.direction": "x", **base}
         for value in values_of(entry, "at" if base.get(f"grains.{NAME}.region") == "at" else scene):
             settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
             if scene == "parts":
@@ -307,7 +315,7 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED[entry.name] for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith(("scene.motion_", "motion.", "stage.", *PARTS)) and entry.condition
+            and entry.name.startswith(("scene.motion_", "motion.", "stage.", "load.", *PARTS)) and entry.condition
             and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
 

@@ -38,6 +38,7 @@ OTHERS = {
     "inputs/log.md",
     "inputs/parts.md",
     "inputs/stages.md",
+    "inputs/walls.md",
     "src/README.md",
     "src/recipes.md",
     "src/algorithms.md",

@@ -105,6 +105,24 @@ SCENES = {
 &stage name = 'rest' until = 'unbalanced' below = 4 longest = 1 gravity = 20, -20 /
 &stage name = 'float' gravity = 0, 0 duration = 0.004 /
 """,
+    # Walls that yield to a stress, a force and a torque, a belt, a gate, and the record of all of them.
+    "walls": """\
+&wall name = 'left' outline = 'rectangle' low = -0.12, -0.1 high = -0.1, 0.1 /
+&wall name = 'right' outline = 'rectangle' low = 0.1, -0.1 high = 0.12, 0.1 /
+&wall name = 'belt' outline = 'line' from = -0.12, -0.1 to = 0.12, -0.1 thickness = 0.02 /
+&wall name = 'lid' outline = 'line' from = 0.12, 0.1 to = -0.12, 0.1 thickness = 0.02 /
+&wall name = 'flap' outline = 'polyline' vertices = -0.03, 0.03, 0, 0, 0.03, 0.03 thickness = 0.004 /
+&wall name = 'gate' outline = 'rectangle' low = -0.1, -0.05 high = -0.02, -0.045 vanish_at = 6e-3 /
+&grains name = 'stones' region = 'box' low = -0.1, -0.1 high = 0.1, 0.1 number = 120 speed = 2 spin = 30 /
+&load name = 'squeeze' wall = 'right' direction = 'x' stress = -2e4 between = 'belt', 'lid' mass = 5 /
+&load name = 'press' wall = 'lid' direction = 'y' force = -3e3 mass = 3 damping_ratio = 0.1 start = 2e-3 end = 1e-2
+   ramp = 1e-3 /
+&load name = 'twist' wall = 'flap' direction = 'angle' torque = 20 mass = 2 /
+&motion name = 'run' wall = 'belt' kind = 'conveyor' velocity = 1, 0 ramp = 3e-3 end = 9e-3 /
+&motion name = 'shake' wall = 'right' kind = 'oscillation' amplitude = 0, 1e-3 frequency = 100 /
+&forces gravity = 0, -40 stiffness = 1e6 /
+&integrate duration = 0.012 /
+""",
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /
@@ -115,7 +133,7 @@ SCENES = {
 
 #: Frames with everything in them, some to a segment; regions that change as often as possible
 OTHER_GROUPS = """\
-&output frame_interval = {interval} frames_per_segment = 7 contacts = .true. /
+&output {series}frame_interval = {interval} frames_per_segment = 7 contacts = .true. /
 &decomposition margin = 1e-4 imbalance = 1 /
 &neighbours finder = '{finder}' /
 """
@@ -128,5 +146,6 @@ def write_scene(path, scene, finder="quadtree", longer=1):
     """Write the namelist of a scene, of so many times its duration, with as many frames in each."""
     head, tail = SCENES[scene].rsplit("duration = ", 1)
     duration, rest = tail.split(" ", 1)
-    groups = OTHER_GROUPS.format(interval=float(duration) / N_FRAMES, finder=finder)
+    series = "series_interval = 1e-4 csv = .true. " if scene == "walls" else ""
+    groups = OTHER_GROUPS.format(interval=float(duration) / N_FRAMES, finder=finder, series=series)
     path.write_text(f"{head}duration = {longer * float(duration)} {rest}{groups}", encoding="utf-8")

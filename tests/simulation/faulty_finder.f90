@@ -22,14 +22,21 @@ program faulty_finder
    !> A gas whose bodies are spread over all ranks
    character(len=*), parameter :: gas = "&scene name = 'gas' bodies = 60 solid_fraction = 0.3 speed = 1 /"// &
       '&forces gravity = 0, 0 /&integrate dt = 1e-6 duration = 1e-3 /'
+   !> Another one in a ring that yields to a load
+   character(len=*), parameter :: ring = "&wall name = 'ring' outline = 'ring' radius = 0.1 segments = 20 "// &
+      "thickness = 0.01 /&grains name = 'g' region = 'inside' wall = 'ring' number = 60 speed = 1 /"// &
+      "&load name = 'l' wall = 'ring' direction = 'x' force = 1 /"// &
+      '&forces gravity = 0, 0 /&integrate dt = 1e-6 duration = 1e-3 /'
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error
 
    call start_library(error)
    call create_world(comm, error)
-   if (.not. allocated(error)) call fail_on_last_rank('push', .false.)
+   if (.not. allocated(error)) call fail_on_last_rank(gas, 'push', .false.)
    ! Here a contact may stop the run, so errors must be known before the step is completed.
-   if (.not. allocated(error)) call fail_on_last_rank('stop', .true.)
+   if (.not. allocated(error)) call fail_on_last_rank(gas, 'stop', .true.)
+   ! A load needs the contacts of all ranks within the step.
+   if (.not. allocated(error)) call fail_on_last_rank(ring, 'push', .true.)
    if (allocated(error)) then
       if (comm%is_root()) write (error_unit, '(a)') error%message
       call comm%finalize()
@@ -40,7 +47,9 @@ program faulty_finder
 contains
 
    !> Do some steps, let the finder of the last rank record the end of a pair that never began, and do one more step.
-   subroutine fail_on_last_rank(degenerate, within_step)
+   subroutine fail_on_last_rank(text, degenerate, within_step)
+      !> Namelist
+      character(len=*), intent(in) :: text
       !> What contacts without direction do
       character(len=*), intent(in) :: degenerate
       !> Whether all ranks must have the error when the step ends
@@ -50,7 +59,7 @@ contains
       type(error_t), allocatable :: failure
       integer :: step
 
-      call read_settings_text('gas.nml', gas, ['overlap.degenerate='//degenerate], settings, failure)
+      call read_settings_text('gas.nml', text, ['overlap.degenerate='//degenerate], settings, failure)
       if (.not. allocated(failure)) call new_simulation(settings, simulation, failure, comm)
       do step = 1, 3
          if (.not. allocated(failure)) call advance(simulation, failure)

@@ -23,6 +23,11 @@ contains
       call row%set('damping_work', balance%damping_work, 'J/m', 'work of the normal damping')
       call row%set('friction_work', balance%friction_work, 'J/m', 'work of the tangential forces')
       call row%set('wall_work', balance%wall_work, 'J/m', 'work done by moving walls')
+      if (balance%has_loads) then
+         call row%set('load_work', balance%load_work, 'J/m', 'work of loads on walls')
+         call row%set('load_damping_work', balance%load_damping_work, 'J/m', 'work of the damping of these walls')
+         call row%set('wall_kinetic', balance%wall_kinetic, 'J/m', 'kinetic energy of these walls')
+      end if
       call row%set('impulse_x', balance%impulse(1), 'N s/m', 'impulse of gravity and fixed bodies along x')
       call row%set('impulse_y', balance%impulse(2), 'N s/m', 'impulse of gravity and fixed bodies along y')
       if (with_angular) &

@@ -56,7 +56,7 @@ module polydem_energy_balance
       !> Energy, momentum along x and y, and angular momentum at the start
       real(wp) :: start(4) = 0.0_wp
       !> Elastic energy of the contacts at the start, if they have one [J/m]
-      real(wp), private :: elastic_start = 0.0_wp
+      real(wp) :: elastic_start = 0.0_wp
    end type energy_balance_t
 
    !> Terms and residuals of the balance at one time
@@ -77,20 +77,22 @@ module polydem_energy_balance
       real(wp) :: friction_work = 0.0_wp
       !> Work done by moving walls [J/m]
       real(wp) :: wall_work = 0.0_wp
+      !> Whether walls yield to loads
+      logical :: has_loads = .false.
+      !> Work of the loads and of the damping of their walls, and their kinetic energy [J/m]
+      real(wp) :: load_work = 0.0_wp, load_damping_work = 0.0_wp, wall_kinetic = 0.0_wp
       !> Impulse of gravity and fixed bodies, (2) [N s/m]
       real(wp) :: impulse(2) = 0.0_wp
       !> Angular impulse of gravity and fixed bodies about the origin [N s]
       real(wp) :: angular_impulse = 0.0_wp
       !> Unexplained energy [J/m]
       real(wp) :: energy_residual = 0.0_wp
-      !> Unexplained energy over the largest kinetic energy or work so far, but at least over 1e-9 of the potential
-      !> energy, which is the level of rounding errors
+      !> Unexplained energy over the largest kinetic energy or work so far, at least over 1e-9 of the potential energy
       real(wp) :: relative_energy_residual = 0.0_wp
       !> Unexplained momentum, over the largest sum of absolute momenta of the bodies so far plus the absolute impulses
-      !> of gravity and of all contacts with fixed bodies
+      !> of gravity on each body and of all contacts with fixed bodies
       real(wp) :: relative_momentum_residual = 0.0_wp
-      !> Unexplained angular momentum, over the largest sum of absolute angular momenta of the bodies so far plus the
-      !> absolute angular impulses of gravity on each body and of all contacts with fixed bodies
+      !> Unexplained angular momentum, likewise with angular momenta and angular impulses
       real(wp) :: relative_angular_residual = 0.0_wp
    end type balance_t
 

@@ -30,7 +30,7 @@ module polydem_stable_step
 contains
 
    !> Find the stable step of the present contacts, and the contact that limits it.
-   subroutine stable_step_of_contacts(law, table, bodies, numbers, contacts, step, critical)
+   subroutine stable_step_of_contacts(law, table, bodies, numbers, contacts, step, critical, yielding)
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
@@ -43,15 +43,19 @@ contains
       real(wp), intent(out) :: step
       !> Index of the contact that limits the step, 0 if there are no contacts
       integer(ip), intent(out) :: critical
-      real(wp), allocatable :: steps(:)
+      !> Mobility that each contact of a fixed body has because its wall yields, (slot) [m/kg]; absent: no wall yields
+      real(wp), intent(in), optional :: yielding(:)
+      real(wp), allocatable :: steps(:), extra(:)
       integer(ip) :: c
 
-      allocate (steps(contacts%n))
+      allocate (steps(contacts%n), extra(contacts%n))
+      extra = 0.0_wp
+      if (present(yielding)) extra = max(yielding(contacts%first(:contacts%n)), yielding(contacts%second(:contacts%n)))
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(law, table, bodies, numbers, contacts, steps) private(c)
+      !$omp    shared(law, table, bodies, numbers, contacts, steps, extra) private(c)
       do c = 1_ip, contacts%n
          steps(c) = step_of_contact(law, table, bodies, [numbers(contacts%first(c)), numbers(contacts%second(c))], &
-                                    contacts, c)
+                                    contacts, c, extra(c))
       end do
       !$omp end parallel do
       step = huge(step)
@@ -67,7 +71,7 @@ contains
    !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is
    !> assumed to have contacts with equal bodies that it hits at a given speed, with the greatest stiffness that its
    !> outline allows.
-   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth, length, damped)
+   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth, length, damped, yielding)
       !> Force law; `measure` is not required
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
@@ -83,8 +87,11 @@ contains
       real(wp), intent(out) :: depth
       !> Length of that contact [m], and its stable step over that without dashpots
       real(wp), intent(out), optional :: length, damped
+      !> Greatest mobility of a wall that yields [m/kg], and greatest product of mobility and length [m2/kg]; absent: no
+      !> wall yields
+      real(wp), intent(in), optional :: yielding(2)
       real(wp), allocatable :: steps(:)
-      real(wp) :: unused(3), found(3)
+      real(wp) :: unused(3), found(3), extra(2)
       integer(ip) :: k, n
 
       n = size(bodies%free, kind=ip)
@@ -93,24 +100,26 @@ contains
       depth = 0.0_wp
       if (present(length)) length = 0.0_wp
       if (present(damped)) damped = 1.0_wp
+      extra = 0.0_wp
+      if (present(yielding)) extra = yielding
       if (n == 0_ip) return
       allocate (steps(n))
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(law, table, bodies, speed, steps, n) private(k, unused)
+      !$omp    shared(law, table, bodies, speed, steps, n, extra) private(k, unused)
       do k = 1_ip, n
-         call find_expected_step(law, table, bodies, bodies%free(k), speed, steps(k), unused)
+         call find_expected_step(law, table, bodies, bodies%free(k), speed, extra, steps(k), unused)
       end do
       !$omp end parallel do
       k = minloc(steps, 1, kind=ip)
       critical = bodies%free(k)
-      call find_expected_step(law, table, bodies, critical, speed, step, found)
+      call find_expected_step(law, table, bodies, critical, speed, extra, step, found)
       depth = found(1)
       if (present(length)) length = found(2)
       if (present(damped)) damped = found(3)
    end subroutine stable_step_of_shapes
 
    !> Find the stable step of the expected contacts of a body.
-   subroutine find_expected_step(law, table, bodies, s, speed, step, found)
+   subroutine find_expected_step(law, table, bodies, s, speed, yielding, step, found)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
@@ -118,6 +127,8 @@ contains
       integer(ip), intent(in) :: s
       !> Speed of approach [m/s]
       real(wp), intent(in) :: speed
+      !> As in `stable_step_of_shapes`; bodies of this size cover the wall
+      real(wp), intent(in) :: yielding(2)
       !> Stable step [s]
       real(wp), intent(out) :: step
       !> Depth and length of the contact [m], and its stable step over that without dashpots
@@ -127,11 +138,12 @@ contains
 
       materials = 0_ip
       if (allocated(bodies%material)) materials = bodies%material(s)
-      call find_step_of_pair(law, table, bodies, s, materials, speed, step, found)
+      call find_step_of_pair(law, table, bodies, s, materials, speed, yielding, step, found)
       if (.not. allocated(law%pairs%stiffness%factor)) return
       do partner = 0_ip, law%pairs%n_materials
          if (partner == materials(1)) cycle
-         call find_step_of_pair(law, table, bodies, s, [materials(1), partner], speed, step_with, found_with)
+         call find_step_of_pair(law, table, bodies, s, [materials(1), partner], speed, yielding, step_with, &
+                                 found_with)
          if (.not. step_with < step) cycle
          step = step_with
          found = found_with
@@ -140,7 +152,7 @@ contains
 
    !> Find the stable step of the expected contacts of a body with equal bodies or, if their material differs, with
    !> heavy ones. (The step of two light bodies of different materials is that of the lighter one on a heavy body.)
-   subroutine find_step_of_pair(law, table, bodies, s, materials, speed, step, found)
+   subroutine find_step_of_pair(law, table, bodies, s, materials, speed, yielding, step, found)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
@@ -150,6 +162,8 @@ contains
       integer(ip), intent(in) :: materials(2)
       !> Speed of approach [m/s]
       real(wp), intent(in) :: speed
+      !> As in `stable_step_of_shapes`; bodies of this size cover the wall
+      real(wp), intent(in) :: yielding(2)
       !> Stable step [s]
       real(wp), intent(out) :: step
       !> Depth and length of the contact [m], and its stable step over that without dashpots
@@ -160,11 +174,12 @@ contains
       number = assumed_contacts
       if (materials(1) /= materials(2)) number = 0.5_wp*assumed_contacts
       call expect_contact(law, bodies, s, materials, speed, element, outline)
-      g(1) = number*bodies%inverse_mass(s)
-      g(2) = number*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
+      g(1) = number*bodies%inverse_mass(s) + (yielding(1) + yielding(2)/bodies%diameter(s))
+      g(2) = number*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s)) &
+             + (yielding(1) + yielding(2)/bodies%diameter(s))
       g(3) = 0.0_wp
       g(4) = number*bodies%inverse_inertia(s)
-      element%tangential_mass = 1.0_wp/(g(2)/number)
+      element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
       call law%stiffen(element)
       ! The contacts of a body share its outline, and so do their dashpots. The springs do not, for accuracy: then an
       ! impact of two bodies takes at least ten steps.
@@ -189,11 +204,11 @@ contains
       !> Index of the contact
       integer(ip), intent(in) :: c
 
-      stable_step_alone = step_of_contact(law, table, bodies, [1.0_wp, 1.0_wp], contacts, c)
+      stable_step_alone = step_of_contact(law, table, bodies, [1.0_wp, 1.0_wp], contacts, c, 0.0_wp)
    end function stable_step_alone
 
    !> Stable step of contact c [s]
-   real(wp) function step_of_contact(law, table, bodies, numbers, contacts, c)
+   real(wp) function step_of_contact(law, table, bodies, numbers, contacts, c, extra)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
@@ -201,10 +216,12 @@ contains
       real(wp), intent(in) :: numbers(2)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
+      !> Mobility of a wall that yields [m/kg]
+      real(wp), intent(in) :: extra
       type(linearised_contact_t) :: element
       real(wp) :: g(4), alone(4)
 
-      g = 0.0_wp
+      g = [extra, extra, 0.0_wp, 0.0_wp]
       alone = 0.0_wp
       call add_body(contacts%first(c), contacts%arm_first(:, c), numbers(1))
       call add_body(contacts%second(c), contacts%arm_second(:, c), numbers(2))

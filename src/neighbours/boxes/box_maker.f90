@@ -2,7 +2,7 @@
 !>
 !> A body of common size has one box, the bounds of its turned vertices. The box of a much larger body, such as a long
 !> wall, would overlap half the scene. A large body is therefore cut into tiles (`polydem_body_tiles`), and each tile
-!> has its own box. The body itself remains one polygon.
+!> has its own box. The body itself remains one polygon. A body of a wall that has vanished has no box.
 !>
 !> If two polygons share a point, their boxes share a point. For whole bodies this follows from the monotonicity of
 !> rounding. Boxes of tiles are padded by a few rounding errors of the size of the body: no gap opens between them when
@@ -87,7 +87,7 @@ contains
       call cut_bodies(maker, bodies, largest_ratio, boxes%n, error)
       if (allocated(error)) return
       boxes%n_pieces = bodies%n
-      boxes%one_to_one = boxes%n == boxes%n_pieces
+      boxes%one_to_one = boxes%n == boxes%n_pieces .and. .not. allocated(bodies%gone)
       allocate (boxes%bounds(4, boxes%n), boxes%piece(boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), &
                 boxes%passive(boxes%n), boxes%reach(boxes%n))
       do s = 1_ip, bodies%n
@@ -107,7 +107,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(cut_body_t), allocatable :: longer(:)
       integer(ip) :: s, room, n_cut, n_tiles, known
-      logical :: fits
+      logical :: fits, is_gone
 
       room = most_tiles
       n_boxes = 0_ip
@@ -116,8 +116,11 @@ contains
       do s = 1_ip, bodies%n
          known = maker%tiles%n
          fits = .true.
+         is_gone = .false.
+         if (allocated(bodies%gone)) is_gone = bodies%gone(s)
          ! A body of small radius is small enough for certain.
-         if (2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) &
+         if (.not. is_gone .and. &
+             2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) &
             call cut_body(bodies%pieces%polygon(s), &
                           maker%median_diameter, largest_ratio, room, maker%tiles, fits)
          n_tiles = maker%tiles%n - known
@@ -125,7 +128,7 @@ contains
             call refuse(bodies%id(s), bodies%diameter(s)/maker%median_diameter, error)
             return
          end if
-         if (n_tiles == 0_ip) then
+         if (n_tiles == 0_ip .and. .not. is_gone) then
             n_boxes = n_boxes + 1_ip
             maker%box(s) = n_boxes
             cycle

@@ -6,6 +6,7 @@
 !>     trace.h5                   recorded boxes (optional)
 !>     steps.h5                   timings and counts of every step (optional)
 !>     overlaps.csv               deep contacts at the start, if any
+!>     series.csv                 series of walls and loads (optional)
 !>     log.txt                    log of the run
 !>     checkpoint_1.h5, _2.h5     the last two checkpoints, written alternately
 !>     manifest.txt               list of these files with checksums (polydem_manifest)
@@ -17,7 +18,7 @@ module polydem_result_files
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: segment_path, checkpoint_path, log_name, overlaps_name, profile_name, steps_name, trace_name
+   public :: segment_path, checkpoint_path, log_name, overlaps_name, profile_name, series_name, steps_name, trace_name
    public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, stem, segment_number, last_segment, &
       manifest_name, forms_of, complete_name, conflict_text
 
@@ -31,7 +32,7 @@ module polydem_result_files
 
    !> Names of single files of a result
    character(len=*), parameter :: manifest_name = 'manifest.txt', log_name = 'log.txt', profile_name = 'profile.h5', &
-      trace_name = 'trace.h5', steps_name = 'steps.h5', overlaps_name = 'overlaps.csv'
+      trace_name = 'trace.h5', steps_name = 'steps.h5', overlaps_name = 'overlaps.csv', series_name = 'series.csv'
 
 contains
 

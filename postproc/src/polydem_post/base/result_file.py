@@ -102,6 +102,13 @@ def balance_of(file):
     return file["energy_balance"]
 
 
+def series_of(file):
+    """Group of the rows of the series in a segment; empty if it has none."""
+    if "series" not in file:
+        return {}
+    return file["series"]
+
+
 def open_file(path: Path, known: dict[Path, tuple[int, ...]] | None = None) -> h5py.File:
     """Open a file, also one that a run is still writing or has just closed and renamed.
 

@@ -20,6 +20,7 @@ from ..base.result_file import (
     insist,
     plain,
     reading,
+    series_of,
 )
 from .contacts import Contacts, Walls
 from .frames import CONTACT_FIELDS, Frame, find_contacts, sound_frame
@@ -215,6 +216,40 @@ class Trajectory:
         return {name: np.concatenate(parts)[self._numbers] for name, parts in columns.items()}
 
     @cached_property
+    def time_series(self) -> dict[str, npt.NDArray[Any]]:
+        """The series of walls and loads by name, each (rows); empty without `series_interval` in &output.
+
+        Its columns are `time`, `step`, `<wall>.force_x` and the like, with all rows of the run, also of some frames.
+        `time_series_units` has their units.
+        """
+        columns: dict[str, list[npt.NDArray[Any]]] = {}
+        for segment in self._files.segments:
+            with self._files.open_segment(segment) as file:
+                parts = {name: values[:] for name, values in entries_of(series_of(file))}
+                if not parts or not len(segment.steps):
+                    continue
+                # A program that dies while it writes rows may leave some columns longer than others.
+                n = min(map(len, parts.values()))
+                n = int(np.searchsorted(parts["step"][:n], segment.steps[-1], side="right"))
+                insist(segment.path, "series", {name: part[:n] for name, part in parts.items()},
+                       dict.fromkeys(parts, (n,)), finite=False)
+                for name, part in parts.items():
+                    columns.setdefault(name, []).append(part[:n])
+        if len({sum(map(len, parts)) for parts in columns.values()}) > 1:
+            raise ResultError(f"{self.folder}: the series lacks columns in some of its segments")
+        return {name: np.concatenate(parts) for name, parts in columns.items()}
+
+    @cached_property
+    def time_series_units(self) -> dict[str, str]:
+        """Unit of each column of `time_series` by name."""
+        units: dict[str, str] = {}
+        for segment in self._files.segments:
+            with reading(segment.path) as file:
+                for name, values in entries_of(series_of(file)):
+                    units[name] = str(values.attrs.get("unit", ""))
+        return units
+
+    @cached_property
     def balance_units(self) -> dict[str, str]:
         """Unit of each entry of `energy_balance` by name."""
         units: dict[str, str] = {}
@@ -307,6 +342,8 @@ class Trajectory:
         if self._shift is not None:
             columns["position"] = columns["position"] + self._shift
             bodies = {**bodies, "cell_low": bodies["cell_low"] + self._shift} if "cell_low" in bodies else bodies
+        if "present" in file.get("walls", ()):
+            columns, bodies = _without(file["walls/id"][:][file["walls/present"][row] == 0], columns, bodies)
         return sound_frame(segment.path, Frame(
             step=int(segment.steps[row]), time=float(segment.times[row]), number=number, shift=shift,
             material_names=tuple(self.settings.get("material", {})), **columns, **bodies, _source=self))
@@ -340,7 +377,8 @@ class Trajectory:
             if "walls" not in file:
                 return Walls(np.empty(0, dtype=np.int32), np.empty((0, 2)), np.empty(0))
             group = file["walls"]
-            walls = Walls(group["id"][:], group["force"][row], group["torque"][row])
+            kept = group["present"][row] == 1 if "present" in group else slice(None)
+            walls = Walls(group["id"][:][kept], group["force"][row][kept], group["torque"][row][kept])
             n = len(walls.id)
             insist(segment.path, "walls", vars(walls), {"id": (n,), "force": (n, 2), "torque": (n,)})
             return walls
@@ -348,9 +386,10 @@ class Trajectory:
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         """Which bodies the stored namelist moves, (n): all fixed ones, or those that a motion lists."""
         scene = self.settings.scene
-        walls = _wall_bodies(self.settings, frame)
+        walls = _wall_bodies(self.settings, self._bodies[1].get("id", frame.id))
         chosen = [walls[motion["wall"]] if motion.get("wall") else motion.get("bodies")
                   for motion in self.settings.get("motion", {}).values()]
+        chosen += [walls[load["wall"]] for load in self.settings.get("load", {}).values()]
         if scene.get("motion", "none") != "none":
             chosen.append(scene.get("motion_bodies"))
         if any(ids is None for ids in chosen):
@@ -362,18 +401,30 @@ class Trajectory:
         return self.origin if self._shift is None else (0.0, 0.0)
 
 
-def _wall_bodies(settings: Settings, frame: Frame) -> dict[str, Any]:
+def _wall_bodies(settings: Settings, ids: npt.NDArray[Any]) -> dict[str, Any]:
     """Identifiers of the bodies of each group &wall: the last bodies of the run, wall after wall, or those it lists."""
     counts = {}
     for name, wall in settings.get("wall", {}).items():
         corners = np.size(wall.get("vertices", [])) // 2
         counts[name] = {"bodies": 0, "ring": wall.get("segments"), "row": wall.get("segments"),
                         "polyline": corners - (not wall.get("closed"))}.get(wall["outline"], 1)
-    ends = len(frame.id) - sum(counts.values()) + np.cumsum([0, *counts.values()])
-    found = {name: np.sort(frame.id)[first:last] for name, first, last in zip(counts, ends, ends[1:])}
+    ends = len(ids) - sum(counts.values()) + np.cumsum([0, *counts.values()])
+    found = {name: np.sort(ids)[first:last] for name, first, last in zip(counts, ends, ends[1:])}
     listed = {name: np.atleast_1d(wall["bodies"]) for name, wall in settings.get("wall", {}).items()
               if wall["outline"] == "bodies"}
     return {**found, **listed}
+
+
+def _without(gone: Any, columns: dict[str, Any], bodies: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Columns of a frame, and of its bodies, without bodies that are gone."""
+    kept = ~np.isin(bodies["id"], gone)
+    if kept.all():
+        return columns, bodies
+    corners = np.diff(bodies["vertex_start"])
+    start = np.concatenate([[0], np.cumsum(corners[kept])]).astype(bodies["vertex_start"].dtype)
+    shape = bodies["shape"][np.repeat(kept, corners)]
+    rows = {name: values[kept] for name, values in bodies.items() if name not in ("shape", "vertex_start")}
+    return {name: values[kept] for name, values in columns.items()}, {**rows, "shape": shape, "vertex_start": start}
 
 
 def _bodies_in(file: h5py.File) -> dict[str, Any]:

@@ -1,0 +1,32 @@
+!> Errors about entries of groups that have names.
+module polydem_blame_entry
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_group_instances, only: instance_t, row_of
+   implicit none
+   private
+   public :: blame
+
+contains
+
+   !> Raise an error about an entry of a group that has a name. It names the place of another entry if this one alone is
+   !> given on the command line.
+   pure subroutine blame(instance, key, problem, error, other)
+      !> The group
+      type(instance_t), intent(in) :: instance
+      !> Key of the entry, and what is wrong, as a predicate
+      character(len=*), intent(in) :: key, problem
+      type(error_t), allocatable, intent(inout) :: error
+      !> Key of the other entry
+      character(len=*), intent(in), optional :: other
+      integer :: row
+
+      row = row_of(instance, key)
+      if (present(other)) then
+         if (instance%values(row_of(instance, other))%is_override .and. .not. instance%values(row)%is_override) &
+            row = row_of(instance, other)
+      end if
+      call raise(error, input_error, instance%values(row)%place//': '''//key//''' in &'//trim(instance%group)//' '// &
+                 instance%name//' '//problem)
+   end subroutine blame
+
+end module polydem_blame_entry

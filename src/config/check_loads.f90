@@ -1,0 +1,118 @@
+!> Checks of the groups &load against each other and against motions.
+module polydem_check_loads
+   use polydem_blame_entry, only: blame
+   use polydem_errors, only: error_t
+   use polydem_group_instances, only: index_of_instance, instance_t
+   use polydem_kinds, only: wp
+   use polydem_settings, only: load_settings_t, motion_settings_t, settings_t
+   implicit none
+   private
+   public :: check_loads
+
+   !> Remedy for a direction in which a wall moves already
+   character(len=*), parameter :: one_of_them = ' at the same time; leave out one of them, or let one begin at the '// &
+      '''end'' of the other'
+
+contains
+
+   !> Check all loads.
+   pure subroutine check_loads(settings, instances, error)
+      !> Settings with all entries filled in
+      type(settings_t), intent(in) :: settings
+      !> All groups with their values, which contain the places for messages
+      type(instance_t), intent(in) :: instances(:)
+      !> First entry that contradicts another
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      do k = 1, size(settings%load)
+         associate (instance => instances(index_of_instance(instances, 'load', settings%load(k)%name)))
+            call check_width(settings%load(k), instance, error)
+            call check_direction(settings, k, instance, error)
+         end associate
+      end do
+   end subroutine check_loads
+
+   !> Check the force of a load, and its times.
+   pure subroutine check_width(load, instance, error)
+      type(load_settings_t), intent(in) :: load
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: has_stress
+
+      has_stress = abs(load%stress) > 0.0_wp
+      if (has_stress .and. abs(load%force) > 0.0_wp) call blame(instance, 'stress', 'cannot be combined with '// &
+         '''force''; give only one of them', error, 'force')
+      if (has_stress .and. .not. load%width > 0.0_wp .and. size(load%between) == 0) call blame(instance, 'stress', &
+         'needs a width on which it acts; give ''width'', or ''between'' = two walls', error)
+      if (.not. has_stress .and. load%width > 0.0_wp) call blame(instance, 'width', 'is used only with ''stress''', &
+         error)
+      if (.not. has_stress .and. size(load%between) > 0) call blame(instance, 'between', &
+         'is used only with ''stress''', error)
+      if (load%width > 0.0_wp .and. size(load%between) > 0) call blame(instance, 'width', 'cannot be combined '// &
+         'with ''between''; give only one of them', error, 'between')
+      if (size(load%between) == 1 .or. size(load%between) > 2) call blame(instance, 'between', &
+         'must name two walls, as in ''left'', ''right''', error)
+      if (size(load%between) == 2) then
+         if (load%between(1)%text == load%between(2)%text) call blame(instance, 'between', &
+            'names the same wall twice; it must name two walls, as in ''left'', ''right''', error)
+      end if
+      if (load%end > 0.0_wp .and. load%end <= load%start) call blame(instance, 'end', 'must be behind ''start''', &
+         error, 'start')
+   end subroutine check_width
+
+   !> Check that nothing else moves the wall along the direction of a load.
+   pure subroutine check_direction(settings, l, instance, error)
+      type(settings_t), intent(in) :: settings
+      !> Number of the load
+      integer, intent(in) :: l
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      associate (load => settings%load(l))
+         do k = 1, l - 1
+            associate (other => settings%load(k))
+               if (other%wall == load%wall .and. other%direction == load%direction .and. &
+                   meet(load%start, load%end, other%start, other%end)) call blame(instance, 'direction', &
+                  'is that of the load '//other%name//' of the same wall'//one_of_them, error)
+            end associate
+         end do
+         do k = 1, size(settings%motion)
+            associate (motion => settings%motion(k))
+               if (motion%wall /= load%wall .and. (motion%wall /= '' .or. size(motion%bodies) > 0)) cycle
+               if (.not. meet(load%start, load%end, motion%start, motion%end)) cycle
+               if (moves_along(load%direction, motion)) call blame(instance, 'direction', 'is one in which the '// &
+                  'motion '//motion%name//' moves the same wall'//one_of_them, error)
+            end associate
+         end do
+      end associate
+   end subroutine check_direction
+
+   !> Whether a motion moves bodies along a direction
+   pure logical function moves_along(direction, motion)
+      character(len=*), intent(in) :: direction
+      type(motion_settings_t), intent(in) :: motion
+      real(wp) :: along(2)
+
+      along = 0.0_wp
+      if (motion%kind == 'translation') along = motion%velocity
+      if (motion%kind == 'oscillation') along = motion%amplitude
+      select case (direction)
+      case ('x')
+         moves_along = abs(along(1)) > 0.0_wp
+      case ('y')
+         moves_along = abs(along(2)) > 0.0_wp
+      case default
+         moves_along = motion%kind == 'rotation'
+      end select
+   end function moves_along
+
+   !> Whether two intervals of time have a common part; an end of 0 is none
+   pure logical function meet(start, end, other_start, other_end)
+      real(wp), intent(in) :: start, end, other_start, other_end
+
+      meet = (.not. other_end > 0.0_wp .or. start < other_end) .and. (.not. end > 0.0_wp .or. other_start < end)
+   end function meet
+
+end module polydem_check_loads

@@ -1,0 +1,41 @@
+!> Energy of walls in the balance: of those that yield to loads, and of those that vanish.
+module polydem_wall_energy
+   use polydem_energy_balance, only: balance_t, energy_balance_t
+   use polydem_kinds, only: wp
+   implicit none
+   private
+   public :: add_loads, release_energy
+
+contains
+
+   !> Add the loads on walls to the balance. The work of a wall that yields is that of its load and its damping, less
+   !> its kinetic energy; the residual gets what is missing.
+   pure subroutine add_loads(sums, energies, balance)
+      !> Running sums; the energy scale may grow
+      type(energy_balance_t), intent(inout) :: sums
+      !> Work of the loads, of the damping and of the contacts on the walls, and kinetic energy of the walls, (4) [J/m]
+      real(wp), intent(in) :: energies(4)
+      !> Terms and residuals of the bodies
+      type(balance_t), intent(inout) :: balance
+
+      balance%has_loads = .true.
+      balance%load_work = energies(1)
+      balance%load_damping_work = energies(2)
+      balance%wall_kinetic = energies(4)
+      sums%energy_scale = max(sums%energy_scale, maxval(abs(energies)))
+      balance%energy_residual = balance%energy_residual + (energies(4) - (energies(1) + energies(2) + energies(3)))
+      balance%relative_energy_residual = 0.0_wp
+      if (sums%energy_scale > 0.0_wp) balance%relative_energy_residual = abs(balance%energy_residual)/sums%energy_scale
+   end subroutine add_loads
+
+   !> Take elastic energy that leaves together with a wall from the energy at the start.
+   pure subroutine release_energy(sums, energy)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      !> The energy [J/m]
+      real(wp), intent(in) :: energy
+
+      sums%elastic_start = sums%elastic_start - energy
+   end subroutine release_energy
+
+end module polydem_wall_energy

@@ -1,0 +1,21 @@
+!> What a row of the series of a run contains: the one place where its columns come together.
+module polydem_series_row
+   use polydem_simulation, only: simulation_t
+   use polydem_wall_load, only: set_load_columns
+   implicit none
+   private
+   public :: collect_row
+
+contains
+
+   !> Set all columns of the present row at the end of a step. Every call gives the same columns in the same order, and
+   !> all ranks get the same values: they are exact sums, or the same on all ranks anyway. Collective.
+   subroutine collect_row(self)
+      !> The simulation; the row of `series` is set
+      type(simulation_t), intent(inout) :: self
+
+      call self%record%set_columns(self%comm, self%dt, self%named, self%bodies, self%walk%walls, self%series%row)
+      if (allocated(self%loads)) call set_load_columns(self%loads, self%dt, self%series%row)
+   end subroutine collect_row
+
+end module polydem_series_row

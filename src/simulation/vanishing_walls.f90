@@ -1,0 +1,65 @@
+!> Walls that vanish: from a step on they meet nothing.
+!>
+!> Their bodies stay where they are among all bodies, so that slots, files and identifiers keep their order, but they
+!> have no boxes any more (`gone` of `bodies_t`). No finder and no contact ever sees them; the pair list is built anew,
+!> as after a replacement of bodies, and the other pairs keep their contact history.
+!>
+!> The elastic energy of the contacts with such a wall leaves with it. The energy balance takes it from its start, so
+!> that no work of the elastic forces appears.
+module polydem_vanishing_walls
+   use polydem_errors, only: error_t
+   use polydem_exact_all_reduce, only: all_reduce_exact_sums
+   use polydem_exact_sum, only: exact_sum_t
+   use polydem_force_sums, only: sum_energy
+   use polydem_kinds, only: ip, wp
+   use polydem_replace_bodies, only: hold_history, settle_bodies
+   use polydem_simulation, only: simulation_t, time_of
+   use polydem_wall_energy, only: release_energy
+   implicit none
+   private
+   public :: remove_walls, find_release
+
+contains
+
+   !> Remove the walls that vanish at the present time, before a step. Collective; all ranks get the same error.
+   subroutine remove_walls(self, error)
+      !> The simulation between two steps
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if what depends on the bodies cannot be built anew
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (.not. self%named%any_vanishes(time_of(self))) return
+      call find_release(self)
+      call release_energy(self%energy_balance, self%named%released)
+      self%named%released = 0.0_wp
+      call hold_history(self)
+      where (self%named%vanishing(time_of(self))) self%named%wall%is_gone = .true.
+      call settle_bodies(self, error)
+   end subroutine remove_walls
+
+   !> Find the elastic energy of the contacts of walls that vanish before the next step, unless a restart has read it.
+   !> Collective.
+   subroutine find_release(self)
+      !> The simulation between two steps; `released` of its walls is set
+      type(simulation_t), intent(inout) :: self
+      type(exact_sum_t) :: sums(1)
+      logical, allocatable :: leaves(:)
+      integer(ip) :: c, w
+
+      if (.not. self%named%has_gates() .or. self%walk%step /= self%step) return
+      self%named%released = 0.0_wp
+      leaves = self%named%vanishing(time_of(self))
+      if (.not. any(leaves) .or. .not. self%walk%walls%energy_is_known) return
+      associate (terms => self%walk%walls)
+         do c = 1_ip, terms%n
+            w = self%named%wall_of(terms%slots(1, c))
+            if (w == 0_ip) cycle
+            ! The energy of a contact is divided between its two bodies.
+            if (leaves(w)) call sums(1)%add(2.0_wp*terms%term(sum_energy, c))
+         end do
+      end associate
+      call all_reduce_exact_sums(self%comm, sums)
+      self%named%released = sums(1)%value()
+   end subroutine find_release
+
+end module polydem_vanishing_walls
