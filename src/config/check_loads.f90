@@ -73,6 +73,7 @@ contains
       associate (load => settings%load(l))
          do k = 1, l - 1
             associate (other => settings%load(k))
+               if (are_in_different_stages(load%stage, other%stage)) cycle
                if (other%wall == load%wall .and. other%direction == load%direction .and. &
                    meet(load%start, load%end, other%start, other%end)) call blame(instance, 'direction', &
                   'is that of the load '//other%name//' of the same wall'//one_of_them, error)
@@ -81,6 +82,7 @@ contains
          do k = 1, size(settings%motion)
             associate (motion => settings%motion(k))
                if (motion%wall /= load%wall .and. (motion%wall /= '' .or. size(motion%bodies) > 0)) cycle
+               if (are_in_different_stages(load%stage, motion%stage)) cycle
                if (.not. meet(load%start, load%end, motion%start, motion%end)) cycle
                if (moves_along(load%direction, motion)) call blame(instance, 'direction', 'is one in which the '// &
                   'motion '//motion%name//' moves the same wall'//one_of_them, error)
@@ -107,6 +109,14 @@ contains
          moves_along = motion%kind == 'rotation'
       end select
    end function moves_along
+
+   !> Whether two loads or motions act in stages that differ
+   pure logical function are_in_different_stages(stage, other)
+      !> Names of the stages, empty without one
+      character(len=*), intent(in) :: stage, other
+
+      are_in_different_stages = stage /= '' .and. other /= '' .and. stage /= other
+   end function are_in_different_stages
 
    !> Whether two intervals of time have a common part; an end of 0 is none
    pure logical function meet(start, end, other_start, other_end)

@@ -32,6 +32,13 @@ contains
             settings%motion(k)%name, 'end', 'cannot be combined with ''stage'': the motion ends with its stage', &
             instances, error)
       end do
+      do k = 1, size(settings%load)
+         if (settings%load(k)%stage == '') cycle
+         if (settings%load(k)%start > 0.0_wp) call blame('load', settings%load(k)%name, 'start', &
+            'cannot be combined with ''stage'': the load begins with its stage', instances, error)
+         if (settings%load(k)%end > 0.0_wp) call blame('load', settings%load(k)%name, 'end', &
+            'cannot be combined with ''stage'': the load ends with its stage', instances, error)
+      end do
       do k = 1, size(settings%wall)
          if (settings%wall(k)%outline == 'result' .and. settings%scene%name /= 'result') call blame('wall', &
             settings%wall(k)%name, 'outline', '= ''result'' needs ''start_from'' in &scene, with name = ''result''', &

@@ -196,11 +196,13 @@ contains
       type(instance_t), intent(in) :: instances(:)
       !> First name that no group has
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: names(:)
+      character(len=:), allocatable :: names(:), place
       integer :: k
 
       if (.not. value%is_active) return
       names = names_of(instances, trim(entry%allowed))
+      place = ' in &'//trim(entry%group)
+      if (entry%key /= entry%allowed) place = ' in '//label(entry)
       do k = 1, size(value%texts)
          if (value%texts(k)%text == '' .or. any(names == value%texts(k)%text)) cycle
          if (size(names) == 0) then
@@ -208,7 +210,7 @@ contains
                ', but the file has no group &'//trim(entry%allowed))
          else
             call raise(error, input_error, value%place//': unknown '//trim(entry%allowed)//' '// &
-               quoted(value%texts(k)%text)//' in &'//trim(entry%group)//suggestion(value%texts(k)%text, names))
+               quoted(value%texts(k)%text)//place//suggestion(value%texts(k)%text, names))
          end if
          return
       end do

@@ -80,6 +80,7 @@ contains
       call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
       ! The result is complete without it.
       if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) call write_checkpoint(run, error)
+      call run%comm%all_reduce_error(error)
    end subroutine run_steps
 
    !> All-reduce the error of a step, and broadcast whether a checkpoint is due and whether the run must end, which the

@@ -10,7 +10,7 @@ module polydem_name_walls
    use polydem_wall_load, only: along_angle, wall_load_t
    implicit none
    private
-   public :: assign_loads, ids_of_wall, name_walls
+   public :: assign_loads, ids_of_wall, name_walls, number_of_stage
 
 contains
 
@@ -106,9 +106,24 @@ contains
             load%damping_ratio = given%damping_ratio
             load%start = given%start
             if (given%end > 0.0_wp) load%end = given%end
+            load%stage = number_of_stage(settings, given%stage)
+            if (load%stage > 0_ip) load%start = huge(1.0_wp)
             load%ramp = given%ramp
          end associate
       end do
    end subroutine assign_loads
+
+   !> Number of the stage with a name; 0 without a name
+   pure integer(ip) function number_of_stage(settings, name) result(number)
+      type(settings_t), intent(in) :: settings
+      !> Its name, or an empty text
+      character(len=*), intent(in) :: name
+      integer(ip) :: k
+
+      number = 0_ip
+      do k = 1_ip, size(settings%stage, kind=ip)
+         if (name /= '' .and. settings%stage(k)%name == name) number = k
+      end do
+   end function number_of_stage
 
 end module polydem_name_walls

@@ -27,7 +27,7 @@ module polydem_scene
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_stack, only: make_stack
    use polydem_strings, only: to_text
-   use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls
+   use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls, number_of_stage
    use polydem_named_walls, only: named_walls_t
    use polydem_wall, only: new_wall, wall_t
    use polydem_wall_bodies, only: wall_bodies_t
@@ -269,14 +269,8 @@ contains
          if (allocated(error)) return
       end do
       do k = 1_ip, size(settings%load, kind=ip)
-         associate (name => settings%load(k)%wall)
-            call find_moved(ids_of_wall(name, named), bodies, slots, moves(n_motions + k, :), error)
-            if (allocated(error)) then
-               error%message = place_of(settings, 'wall.'//name, 'bodies')//": 'bodies' in &wall "//name//': '// &
-                  error%message
-               return
-            end if
-         end associate
+         call find_loaded(settings, settings%load(k)%wall, named, bodies, slots, moves(n_motions + k, :), error)
+         if (allocated(error)) return
       end do
       allocate (wall_of(size(slots)), first(size(slots)))
       wall_of = 0_ip
@@ -298,17 +292,20 @@ contains
       end do
    end subroutine assign_motions
 
-   !> Number of the stage with a name; 0 without a name
-   pure integer(ip) function number_of_stage(settings, name) result(number)
+   !> Find the bodies of a wall that yields to a load.
+   subroutine find_loaded(settings, name, named, bodies, slots, is_moved, error)
       type(settings_t), intent(in) :: settings
       character(len=*), intent(in) :: name
-      integer(ip) :: k
+      type(wall_bodies_t), intent(in) :: named(:)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: slots(:)
+      logical, intent(out) :: is_moved(:)
+      type(error_t), allocatable, intent(inout) :: error
 
-      number = 0_ip
-      do k = 1_ip, size(settings%stage, kind=ip)
-         if (name /= '' .and. settings%stage(k)%name == name) number = k
-      end do
-   end function number_of_stage
+      call find_moved(ids_of_wall(name, named), bodies, slots, is_moved, error)
+      if (allocated(error)) error%message = place_of(settings, 'wall.'//name, 'bodies')//": 'bodies' in &wall "// &
+         name//': '//error%message
+   end subroutine find_loaded
 
    !> Parameters of a motion; revolutions per second and hertz become radians per second
    pure type(motion_t) function prescribed(motion)

@@ -6,6 +6,7 @@ module polydem_begin_stage
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_stage
+   use polydem_run_stages, only: run_stages_t
    use polydem_simulation, only: simulation_t
    use polydem_sort, only: place_in
    use polydem_source_locations, only: place_of
@@ -66,7 +67,7 @@ contains
       call find_last_steps(self)
    end subroutine begin_stage
 
-   !> Let force law, other forces, free flight and motions use the parameters of the present stage.
+   !> Let force law, other forces, free flight, motions and loads use the parameters of the present stage.
    subroutine use_parameters(self)
       type(simulation_t), intent(inout) :: self
       integer :: j, k
@@ -78,14 +79,31 @@ contains
       do j = 1, size(self%walls)
          do k = 1, size(self%walls(j)%motions)
             associate (motion => self%walls(j)%motions(k), stages => self%stages)
-               if (motion%stage == 0_ip .or. motion%stage > stages%number) cycle
-               motion%start = real(stages%first(motion%stage), wp)*self%dt
-               motion%end = huge(1.0_wp)
-               if (motion%stage < stages%number) motion%end = real(stages%first(motion%stage + 1_ip), wp)*self%dt
+               call set_window(stages, self%dt, motion%stage, motion%start, motion%end)
             end associate
          end do
       end do
+      if (.not. allocated(self%loads)) return
+      do k = 1, size(self%loads)
+         call set_window(self%stages, self%dt, self%loads(k)%stage, self%loads(k)%start, self%loads(k)%end)
+      end do
    end subroutine use_parameters
+
+   !> Set the times at which a motion or a load begins and ends, as far as they are known.
+   pure subroutine set_window(stages, dt, stage, start, end)
+      type(run_stages_t), intent(in) :: stages
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Number of the stage in which it acts; 0: it depends on no stage
+      integer(ip), intent(in) :: stage
+      !> The times [s]
+      real(wp), intent(inout) :: start, end
+
+      if (stage == 0_ip .or. stage > stages%number) return
+      start = real(stages%first(stage), wp)*dt
+      end = huge(1.0_wp)
+      if (stage < stages%number) end = real(stages%first(stage + 1_ip), wp)*dt
+   end subroutine set_window
 
    !> Find the last step of the present stage, unless its condition has decided it, and of the run.
    subroutine find_last_steps(self)

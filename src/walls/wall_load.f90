@@ -54,6 +54,8 @@ module polydem_wall_load
       real(wp) :: damping_ratio = 1.0_wp, damping = 0.0_wp
       !> Times between which the wall yields [s]
       real(wp) :: start = 0.0_wp, end = huge(1.0_wp)
+      !> Number of the stage of the run in which it acts, which sets start and end; 0: it depends on no stage
+      integer(ip) :: stage = 0_ip
       !> Time in which the force grows [s]
       real(wp) :: ramp = 0.0_wp
       !> Displacement [m] or angle [rad], and its derivatives

@@ -43,14 +43,16 @@ SCENES = {
 NAME = "only_1"
 #: Required entries of each motion
 MOTIONS = {"rotation": {"motion_rate": "1"}, "translation": {"motion_velocity": "0.1, 0"},
-           "oscillation": {"motion_amplitude": "1e-3, 0", "motion_frequency": "10"}}
+           "oscillation": {"motion_amplitude": "1e-3, 0", "motion_frequency": "10"},
+           "conveyor": {"motion_velocity": "0.1, 0"}, "table": {"motion_file": "'none.csv'"}}
 #: Required entries of each kind of wall, region, arrangement and shape of grains, by the entry and its word
 PARTS = {
     "outline": {"line": {"from": "-1, -1", "to": "2, -1", "thickness": "0.1"},
                 "polyline": {"vertices": "-1, -1, 1, -1, 2, 0", "thickness": "0.1"},
                 "rectangle": {"low": "-1, -2", "high": "2, -1"}, "bodies": {"bodies": "1"},
                 "ring": {"centre": "0.5, 0.5", "radius": "1", "segments": "20", "thickness": "0.1"},
-                "polygon": {"vertices": "-1, -2, 1, -2, 0, -1"}},
+                "polygon": {"vertices": "-1, -2, 1, -2, 0, -1"}, "result": {},
+                "row": {"from": "-1, -1", "to": "2, -1", "radius": "0.1", "segments": "10"}},
     "region": {"box": {"low": "0, 0", "high": "0.2, 0.2"}, "disc": {"radius": "0.1"}, "at": {"at": "0.1, 0.1"},
                "polygon": {"vertices": "0, 0, 0.2, 0, 0.2, 0.2, 0, 0.2"}, "inside": {"wall": f"'{NAME}'"}},
     "arrangement": {"loose": {}, "spread": {}, "row": {}, "random": {}, "single": {"region": "at"},
@@ -59,6 +61,9 @@ PARTS = {
               "outline": {"outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3"}},
     "sizes": {"uniform": {}, "octaves": {"size_ratio": "2"}}, "momentum": {"random": {}, "zero": {}},
 }
+#: Required entries of groups that need a scene of parts
+REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x"}, "stage": {},
+            "contact_pair": {"materials": f"'{NAME}', '{NAME}'", "friction_coefficient": "0.1"}}
 #: What is not a number, or not one number
 NO_NUMBERS = ("'text'", "word", ".true.", "nan", "NaN", "inf", "-inf", "Infinity", "", "1 2 3", "1, 2, 3", ",", "1,,2",
               "0x10", "1_4", "2*1", "(1,2)", "1.e", "--1", "1e+", "+", "1d400", "1e400", "1e999999", "1e-400",
@@ -112,6 +117,9 @@ def contexts(row):
         for parts in parts_with(row):
             yield {**parts, "integrate.duration": "1e-3"}
         return
+    if row.group in REQUIRED:
+        yield from with_required(row)
+        return
     key, _, words = row.needs.rpartition(":")
     scenes, others = ["bed"], [{}]
     if row.group == "scene" and key == "name":
@@ -134,6 +142,26 @@ def contexts(row):
                "integrate.duration": "1e-3"}
 
 
+def with_required(row):
+    """A scene of parts with a group and its required entries, with which a row of the group is in use."""
+    key, _, words = row.needs.rpartition(":")
+    parts = {"wall": {"outline": "rectangle", **PARTS["outline"]["rectangle"]},
+             "grains": {"region": "box", "number": "9", **PARTS["region"]["box"]}, "material": {}}
+    for word in words.split() or [None]:
+        entries = {**REQUIRED[row.group], **({key: word} if word else {})}
+        if row.group == "stage":
+            until = entries.setdefault("until", "duration")
+            entries.update({"duration": "1"} if until == "duration" else {"longest": "1", "below": "1"})
+            entries.update({"wall": f"'{NAME}'", "opposite": f"'{NAME}'"} if until == "strain" else {})
+            entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
+        if entries.get("direction") == "angle":
+            entries["torque"] = "1"
+        groups = {**({} if row.group == "cell" else parts), row.group: entries}
+        yield {**{entry_of(group, name): value for group, given in groups.items()
+                  for name, value in {**({"name": f"'{NAME}'"} if group in REPEATABLE else {}), **given}.items()},
+               **({} if row.group == "stage" else {"integrate.duration": "1e-3"})}
+
+
 def parts_with(row):
     """Walls and grains with which a row of one of their groups is in use."""
     key, _, words = row.needs.rpartition(":")
@@ -154,7 +182,7 @@ def parts_with(row):
 def all_cases(rows):
     """Cases of each row, (row: list of cases)."""
     for row in rows:
-        if row.key == "bodies_file":
+        if row.key in ("bodies_file", "start_from"):
             usual = [{"scene.name": row.needs.split()[-1], "integrate.duration": "1e-3"}]
         elif row.group == "bench":
             # The scene does not exist, so a bench whose entries are legal ends at once.

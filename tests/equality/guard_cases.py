@@ -107,7 +107,7 @@ VARIED = {
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
     "cell.shear_rate": None, "cell.shear_ramp": None, "wall.one.corners": "6",
-    "motion.one.stage": None, "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
+    "motion.one.stage": None, "load.one.stage": None, "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
     "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
     "stage.one.gravity": "1, -20", "stage.one.friction_scale": "0.5", "stage.one.drag": "2",
@@ -150,7 +150,7 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
-             **dict.fromkeys(("motion.one.stage", "scene.start_from", "stage.one.wall", "stage.one.opposite"),
+             **dict.fromkeys(("motion.one.stage", "load.one.stage", "scene.start_from", "stage.one.wall", "stage.one.opposite"),
                              "check_stages.py"),
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
@@ -160,7 +160,8 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
 UNTRIED = {("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
-           ("stage.one.until", "strain"), ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
+           ("stage.one.until", "strain"), ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"),
+           ("grains.one.arrangement", "column")}
 
 #: Numbers of ranks of the program with MPI
 RANKS = (1, 2, 3)

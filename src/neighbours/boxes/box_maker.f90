@@ -6,10 +6,8 @@
 !>
 !> If two polygons share a point, their boxes share a point. For whole bodies this follows from the monotonicity of
 !> rounding. Boxes of tiles are padded by a few rounding errors of the size of the body: no gap opens between them when
-!> the body turns.
-!>
-!> For interactions with a range, all boxes can be padded by a margin. If the distance of two bodies is less than twice
-!> the margin, their boxes overlap.
+!> the body turns. For interactions with a range, all boxes can be padded by a margin. If the distance of two bodies is
+!> less than twice the margin, their boxes overlap.
 module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
    use polydem_body_tiles, only: cut_body
@@ -28,9 +26,8 @@ module polydem_box_maker
    public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, turn_and_bound_in_cell, place_boxes, &
       place_in_cell, update_boxes
 
-   !> Allowance for rounding, in units of epsilon times the diameter of a body
+   !> Allowance for rounding, in units of epsilon times the diameter, and greatest number of tiles of all cut bodies
    real(wp), parameter :: roundings = 64.0_wp
-   !> Greatest number of tiles of all cut bodies together
    integer(ip), parameter :: most_tiles = 200000_ip
 
    !> A body that is cut into tiles

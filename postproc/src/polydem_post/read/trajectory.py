@@ -344,9 +344,10 @@ class Trajectory:
             bodies = {**bodies, "cell_low": bodies["cell_low"] + self._shift} if "cell_low" in bodies else bodies
         if "present" in file.get("walls", ()):
             columns, bodies = _without(file["walls/id"][:][file["walls/present"][row] == 0], columns, bodies)
+        names = tuple(self.settings.get("material", {})) if "material" in bodies else ()
         return sound_frame(segment.path, Frame(
             step=int(segment.steps[row]), time=float(segment.times[row]), number=number, shift=shift,
-            material_names=tuple(self.settings.get("material", {})), **columns, **bodies, _source=self))
+            material_names=names, **columns, **bodies, _source=self))
 
     def contacts_of(self, frame: Frame) -> Contacts:
         """The contacts of a frame of this run; `frame.contacts` calls it."""
