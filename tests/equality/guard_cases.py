@@ -107,7 +107,8 @@ VARIED = {
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
     "cell.shear_rate": None, "cell.shear_ramp": None, "wall.one.corners": "6",
-    "motion.one.stage": None, "load.one.stage": None, "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
+    "motion.one.stage": None, "load.one.stage": None,
+    "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
     "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
     "stage.one.gravity": "1, -20", "stage.one.friction_scale": "0.5", "stage.one.drag": "2",
@@ -150,7 +151,8 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
-             **dict.fromkeys(("motion.one.stage", "load.one.stage", "scene.start_from", "stage.one.wall", "stage.one.opposite"),
+             **dict.fromkeys(("motion.one.stage", "load.one.stage",
+                               "scene.start_from", "stage.one.wall", "stage.one.opposite"),
                              "check_stages.py"),
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
@@ -265,15 +267,7 @@ def entry_cases(entries):
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
             base[condition] = words[0]
             base = {key: value for key, value in base.items() if fits(key, base, entries)}
-        if entry.name == "scene.motion" or entry.name.startswith("motion."):
-            base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
-        if entry.name.startswith("stage."):
-            del base["integrate.duration"]
-            base.setdefault(f"stage.{NAME}.until", "duration")
-        if entry.name.startswith("motion."):
-            base.setdefault(f"motion.{NAME}.kind", "rotation")
-        if entry.name.startswith("load."):
-            base = {f"load.{NAME}.wall": NAME, f"load.{NAME}.direction": "x", **base}
+        base = base_of(entry, base)
         for value in values_of(entry, "at" if base.get(f"grains.{NAME}.region") == "at" else scene):
             settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
             if scene == "parts":
@@ -288,6 +282,20 @@ def entry_cases(entries):
             name = f"entries/{entry.name}={value.replace(', ', ',')}" + f"@{scene}" * (scene != "drum")
             name += "".join(f"-{word}" for word in words[:1] if scene == "parts")
             yield generated(name, settings, ranks=3 if entry.name.startswith("decomposition.") else None)
+
+
+def base_of(entry, base):
+    """Settings without what excludes an entry, and with what its group needs."""
+    if entry.name == "scene.motion" or entry.name.startswith("motion."):
+        base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
+    if entry.name.startswith("stage."):
+        del base["integrate.duration"]
+        base.setdefault(f"stage.{NAME}.until", "duration")
+    if entry.name.startswith("motion."):
+        base.setdefault(f"motion.{NAME}.kind", "rotation")
+    if entry.name.startswith("load."):
+        base = {f"load.{NAME}.wall": NAME, f"load.{NAME}.direction": "x", **base}
+    return base
 
 
 def fitting_parts(settings, entries):
