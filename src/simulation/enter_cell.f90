@@ -6,9 +6,11 @@ module polydem_enter_cell
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
+   use polydem_motion_table, only: greatest_values
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
+   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: enter_cell, check_constraint
@@ -132,7 +134,7 @@ contains
       end associate
    end subroutine check_size
 
-   !> Check that no body that spans the cell moves along it.
+   !> Check that no body that spans the cell moves along it, and that none turns, since its copies would not.
    subroutine check_walls(self, error)
       type(simulation_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
@@ -141,19 +143,81 @@ contains
 
       do w = 1, size(self%walls)
          do k = 1_ip, size(self%walls(w)%slots, kind=ip)
-            associate (s => self%walls(w)%slots(k), bodies => self%bodies, motions => self%walls(w)%motions)
+            associate (s => self%walls(w)%slots(k), bodies => self%bodies)
+               if (allocated(error)) return
+               if (turns(self, w, s)) call refuse(self, s, 'turns, which its copies do not; leave out the angles of '// &
+                  'its table of motion, and loads along ''angle''', error)
                do axis = 1, 2
                   if (allocated(error)) return
                   if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%folds(axis, s) > 0.0_wp) cycle
-                  if (.not. any(abs(motions%velocity(axis)) > 0.0_wp .or. abs(motions%amplitude(axis)) > 0.0_wp)) cycle
-                  call raise(error, input_error, place_of(self%settings, 'cell', 'periodic')//': ''periodic'' in '// &
-                     '&cell: the fixed body '//to_text(bodies%id(s))//' spans the cell and cannot move along '// &
-                     name(axis)//'; make it of bodies that are shorter than half the cell, for example with '// &
-                     'outline = ''row'' in &wall')
+                  if (moves_along(self, w, s, axis)) call refuse(self, s, 'spans the cell and cannot move along '// &
+                     name(axis)//'; use a conveyor, or make it of bodies that are shorter than half the cell, for '// &
+                     'example with outline = ''row'' in &wall', error)
                end do
             end associate
          end do
       end do
    end subroutine check_walls
+
+   !> Whether a fixed body of a wall turns by a table or a load. Motions of the kind rotation are refused before.
+   pure logical function turns(self, w, s)
+      type(simulation_t), intent(in) :: self
+      !> Number of the wall
+      integer, intent(in) :: w
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      real(wp) :: values(3)
+      integer :: m
+
+      turns = is_loaded(self, s, along_angle)
+      do m = 1, size(self%walls(w)%motions)
+         if (.not. allocated(self%walls(w)%motions(m)%table)) cycle
+         values = greatest_values(self%walls(w)%motions(m)%table)
+         turns = turns .or. values(3) > 0.0_wp
+      end do
+   end function turns
+
+   !> Whether a fixed body of a wall changes its place along an axis. The bodies of a conveyor stay.
+   pure logical function moves_along(self, w, s, axis)
+      type(simulation_t), intent(in) :: self
+      integer, intent(in) :: w
+      integer(ip), intent(in) :: s
+      integer, intent(in) :: axis
+      real(wp) :: values(3)
+      integer :: m
+
+      moves_along = is_loaded(self, s, axis)
+      do m = 1, size(self%walls(w)%motions)
+         associate (motion => self%walls(w)%motions(m))
+            if (motion%kind == 'conveyor') cycle
+            values = 0.0_wp
+            if (allocated(motion%table)) values = greatest_values(motion%table)
+            moves_along = moves_along .or. abs(motion%velocity(axis)) + abs(motion%amplitude(axis)) + values(axis) > 0.0_wp
+         end associate
+      end do
+   end function moves_along
+
+   !> Whether a load displaces a body along a direction, 1, 2 or `along_angle`
+   pure logical function is_loaded(self, s, direction)
+      type(simulation_t), intent(in) :: self
+      integer(ip), intent(in) :: s
+      integer, intent(in) :: direction
+
+      is_loaded = .false.
+      if (allocated(self%loads)) is_loaded = any(self%loads%wall == self%named%wall_of(s) .and. &
+                                                 self%loads%direction == direction)
+   end function is_loaded
+
+   !> Raise an error about a fixed body in a periodic cell.
+   subroutine refuse(self, s, words, error)
+      type(simulation_t), intent(in) :: self
+      integer(ip), intent(in) :: s
+      !> What is wrong, and the remedy
+      character(len=*), intent(in) :: words
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, place_of(self%settings, 'cell', 'periodic')//': ''periodic'' in &cell: the fixed '// &
+         'body '//to_text(self%bodies%id(s))//' '//words)
+   end subroutine refuse
 
 end module polydem_enter_cell

@@ -41,6 +41,7 @@ def pytest_configure(config):
     config.outcomes = {}
     config.expected = {}
     config.restarts = []
+    config.matrix = {}
 
 
 @pytest.fixture
@@ -70,6 +71,12 @@ def expected(request, tmp_path_factory):
 def restarts(request):
     """Runs that went on with another number of ranks: scene, ranks, steps at the interruptions."""
     return request.config.restarts
+
+
+@pytest.fixture
+def matrix(request):
+    """Runs that had one hash, by pair of capabilities."""
+    return request.config.matrix
 
 
 def pytest_sessionfinish(session):
@@ -103,4 +110,8 @@ def table(config):
     for scene, numbers, steps in config.restarts:
         way = " -> ".join(str(number or "serial") for number in numbers)
         lines.append(f"| {scene} | {way} | {', '.join(map(str, steps))} |")
+    if config.matrix:
+        lines += ["", f"Pairs of [capabilities](capabilities.py): {len(config.matrix)} pairs, each with one hash in "
+                  f"{min(config.matrix.values())} runs with finders, 1 to 4 threads, 1 to 7 ranks and interruptions "
+                  "drawn by seed."]
     return "\n".join(lines) + "\n"

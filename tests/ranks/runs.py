@@ -2,7 +2,9 @@
 
 import os
 import re
+import signal
 import subprocess
+import time
 from pathlib import Path
 
 import h5py
@@ -12,6 +14,11 @@ from polydem_post.base.columns import field_names
 #: Programs without and with MPI
 SERIAL = os.environ["POLYDEM_PROGRAM"]
 PARALLEL = os.environ["POLYDEM_MPI_PROGRAM"]
+
+#: All finders, from the table of entries
+FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
+                    (Path(__file__).parents[2] / "inputs" / "entries.md").read_text(encoding="utf-8"),
+                    re.MULTILINE).group(1).split(", ")
 
 #: Lines that the program writes about what is wrong, its Fortran library or a sanitizer. Libraries of MPI may say more.
 OWN_LINE = re.compile(r"polydem: |.*(Fortran runtime|At line \d|Error termination|Note: The following floating-point|"
@@ -101,3 +108,17 @@ def differences(one, other):
 def newest(folder):
     """When the newest checkpoint was written; 0 if there is none."""
     return max((path.stat().st_mtime_ns for path in folder.glob("checkpoint_?.h5")), default=0)
+
+
+def interrupt(folder, namelist, ranks, threads=1, options=()):
+    """Begin or continue a run, and end it by a signal soon after its next checkpoint."""
+    before = newest(folder)
+    process = start(namelist, folder, ranks, threads, ("--continue", *options))
+    end = time.monotonic() + 600
+    while newest(folder) == before and process.poll() is None:
+        assert time.monotonic() < end, "waited in vain for a checkpoint"
+        time.sleep(0.002)
+    process.send_signal(signal.SIGUSR1)
+    output, message = process.communicate(timeout=600)
+    assert process.returncode == 75, (process.returncode, message)
+    return int(re.search(r"interrupted by SIGUSR1 at step (\d+) of", message).group(1)), output

@@ -1,23 +1,29 @@
 """Runs of several processes give what one process gives, in every bit."""
 
 import re
-import signal
 import subprocess
-import time
 from itertools import product
 from pathlib import Path
 
 import pytest
 from conftest import Outcome
-from runs import ENVIRONMENT, PARALLEL, complaints, contents, count, differences, frames, newest, run, start, state_hash
+from runs import (
+    ENVIRONMENT,
+    FINDERS,
+    PARALLEL,
+    complaints,
+    contents,
+    count,
+    differences,
+    frames,
+    interrupt,
+    run,
+    state_hash,
+)
 from scenes import SCENES, write_scene
 
 RANKS = (1, 2, 3, 4, 7)
 THREADS = (1, 2)
-#: All finders, from the table of entries
-FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
-                    (Path(__file__).parents[2] / "inputs" / "entries.md").read_text(encoding="utf-8"),
-                    re.MULTILINE).group(1).split(", ")
 #: How often bodies are handed out anew at least; grains in a stack hardly move
 LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "materials": 100, "cell": 100,
                      "shear": 100, "chute": 100, "stages": 30, "walls": 100, "stack": 1}
@@ -136,20 +142,6 @@ def test_bodies_leave_and_enter_alike_on_any_number_of_ranks():
     assert set(told.values()) == {told[1]}, told
 
 
-def interrupt(folder, namelist, ranks, options):
-    """Begin or continue a run, and end it by a signal soon after its next checkpoint."""
-    before = newest(folder)
-    process = start(namelist, folder, ranks, 1, ("--continue", *options))
-    end = time.monotonic() + 600
-    while newest(folder) == before and process.poll() is None:
-        assert time.monotonic() < end, "waited in vain for a checkpoint"
-        time.sleep(0.002)
-    process.send_signal(signal.SIGUSR1)
-    output, message = process.communicate(timeout=600)
-    assert process.returncode == 75, (process.returncode, message)
-    return int(re.search(r"interrupted by SIGUSR1 at step (\d+) of", message).group(1)), output
-
-
 @pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1)),
                                           ("chute", (1, 3, None)), ("shear", (2, None, 3)), ("walls", (2, 3, None))],
                          ids=("drum-3-2-serial", "gas-serial-4-3", "bed-2-7-1", "chute-1-3-serial", "shear-2-serial-3",
@@ -159,7 +151,7 @@ def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_
     options = ("--set", "checkpoint.steps=100")
     whole, _ = run(tmp_path / "scene.nml", tmp_path / "whole", None, 1, options)
     folder = tmp_path / "result"
-    steps = [interrupt(folder, tmp_path / "scene.nml", number, options)[0] for number in ranks[:2]]
+    steps = [interrupt(folder, tmp_path / "scene.nml", number, options=options)[0] for number in ranks[:2]]
     assert 0 < steps[0] < steps[1] < count(whole, "steps"), steps
     output, _ = run(tmp_path / "scene.nml", folder, ranks[2], 1, ("--continue", *options))
     assert f"step {steps[1]}\n" in output

@@ -1,0 +1,117 @@
+"""What a scene can switch on, in pieces that fit together: any two of them make a scene.
+
+A capability says what it adds to groups of the namelist. Grains fly about in a box of four walls, in a channel that is
+periodic along x, or in a cell without walls.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+#: Containers: groups, and the capabilities that choose one
+BOX = """\
+&wall name = 'floor' outline = 'rectangle' low = -0.06, -0.07 high = 0.06, -0.05 {wall} /
+&wall name = 'left' outline = 'rectangle' low = -0.07, -0.05 high = -0.05, 0.09 {wall} /
+&wall name = 'right' outline = 'rectangle' low = 0.05, -0.05 high = 0.07, 0.09 /
+&wall name = 'lid' outline = 'rectangle' low = -0.049, 0.05 high = 0.049, 0.06 /
+"""
+CHANNEL = """\
+&cell periodic = 'x' low = -0.05, 0 size = 0.1, 0 /
+&wall name = 'floor' outline = 'line' from = -0.08, -0.05 to = 0.08, -0.05 thickness = 0.01 {wall} /
+&wall name = 'lid' outline = 'line' from = 0.08, 0.05 to = -0.08, 0.05 thickness = 0.01 /
+"""
+CELL = "&cell periodic = 'xy' low = -0.05, -0.05 size = 0.1, 0.1 /\n"
+SHEARED = CELL.replace("/", "shear_rate = 60 shear_ramp = 5e-3 profile = .true. /")
+
+#: Grains in the lower and in the upper half
+GRAINS = """\
+&grains name = 'lower' region = 'box' low = -0.05, -0.05 high = 0.05, -0.006 number = 25 arrangement = 'spread'
+   speed = 1 spin = 30 {lower} /
+&grains name = 'upper' region = 'box' low = -0.05, 0.006 high = 0.05, 0.05 number = 25 arrangement = 'spread'
+   speed = 1 spin = 30 {upper} /
+"""
+
+
+@dataclass(frozen=True)
+class Capability:
+    """Whole groups, and entries of groups that every scene has."""
+
+    groups: str = ""
+    container: str = ""
+    forces: str = ""
+    integrate: str = ""
+    output: str = ""
+    #: Entries of some walls and of the two groups of grains
+    wall: str = ""
+    lower: str = ""
+    upper: str = ""
+    #: Whether it needs a floor and a lid
+    needs_walls: bool = False
+
+
+CAPABILITIES = {
+    "channel": Capability(container=CHANNEL),
+    "cell": Capability(container=CELL),
+    "shear": Capability(container=SHEARED),
+    "materials": Capability(
+        groups="&material name = 'hard' stiffness = 8e5 restitution = 0.9 friction_coefficient = 0.1 /\n"
+               "&material name = 'soft' density = 900 restitution = 0.3 friction_coefficient = 0.8 /\n"
+               "&contact_pair name = 'both' materials = 'hard', 'soft' friction_coefficient = 0.4 restitution = 0.6 /\n"
+               "&scene material = 'hard' /\n",
+        wall="material = 'soft'", upper="material = 'soft'"),
+    "cohesion": Capability(forces="cohesion = 200"),
+    "drag": Capability(forces="drag = 4"),
+    "hunt_crossley": Capability(forces="damping = 'hunt_crossley' damping_coefficient = 1"),
+    "area_law": Capability(forces="law = 'area'"),
+    "exact_friction": Capability(forces="friction = 'exact'"),
+    "gear": Capability(integrate="scheme = 'gear' safety_factor = 0.6"),
+    "compensated": Capability(integrate="accumulation = 'compensated'"),
+    "load": Capability(
+        groups="&load name = 'press' wall = 'lid' direction = 'y' stress = -2e3 width = 0.1 mass = 3 ramp = 2e-3 /\n",
+        needs_walls=True),
+    "gate": Capability(groups="&wall name = 'shelf' outline = 'rectangle' low = -0.03, -1e-3 high = 0.03, 1e-3"
+                              " vanish_at = 7e-3 /\n", needs_walls=True),
+    "belt": Capability(groups="&motion name = 'belt' wall = 'floor' kind = 'conveyor' velocity = 2, 0 ramp = 3e-3 /\n",
+                       needs_walls=True),
+    "shake": Capability(groups="&motion name = 'shake' wall = 'floor' kind = 'oscillation' amplitude = 0, 1e-3"
+                               " frequency = 150 /\n", needs_walls=True),
+    "stages": Capability(
+        groups="&stage name = 'smooth' until = 'kinetic' below = 1e3 hold = 7e-3 longest = 1 check = 7"
+               " friction_scale = 0 /\n"
+               "&stage name = 'rough' duration = 0.011 gravity = 20, -20 /\n"),
+    "series": Capability(output="series_interval = 2e-4 csv = .true."),
+}
+
+#: Pairs that the program refuses, and a part of its message
+REFUSED = {
+    ("exact_friction", "shear"): "does not know the velocity of the border",
+    ("exact_friction", "gear"): "velocity_verlet",
+    ("compensated", "gear"): "accumulation",
+}
+
+
+def pairs():
+    """All pairs of names that make a scene: no two containers, no wall that a cell lacks."""
+    for two in combinations(sorted(CAPABILITIES), 2):
+        chosen = [CAPABILITIES[name] for name in two]
+        without_walls = any(part.container in (CELL, SHEARED) for part in chosen)
+        if all(part.container for part in chosen) or (without_walls and any(part.needs_walls for part in chosen)):
+            continue
+        yield two
+
+
+def text(names):
+    """The namelist of a scene that has these capabilities."""
+    chosen = [CAPABILITIES[name] for name in names]
+
+    def joined(entry):
+        return " ".join(value for value in (getattr(part, entry) for part in chosen) if value)
+
+    container = joined("container") or BOX
+    gravity = "0, 0" if container in (CELL, SHEARED) else "0, -40"
+    duration = "" if "stages" in names else "duration = 0.02"
+    return (container.format(wall=joined("wall")) + GRAINS.format(lower=joined("lower"), upper=joined("upper"))
+            + "".join(part.groups for part in chosen)
+            + f"&forces gravity = {gravity} stiffness = 4e5 {joined('forces')} /\n"
+            + f"&integrate {duration} {joined('integrate')} /\n"
+            + f"&output frame_interval = 1e-3 frames_per_segment = 6 contacts = .true. {joined('output')} /\n"
+            + "&decomposition margin = 1e-4 imbalance = 1 /\n&checkpoint steps = 60 /\n")

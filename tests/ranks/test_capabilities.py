@@ -1,0 +1,81 @@
+"""Any two capabilities together: the same bits for any finder, ranks and threads, and after an interruption.
+
+A pair of capabilities is run with all pairs on one thread; then with a finder, ranks and threads that a seed draws;
+then once more, interrupted and continued with others. `--full` tries every pair, and more than once.
+"""
+
+import random
+from collections import Counter
+
+import pytest
+from capabilities import CAPABILITIES, REFUSED, pairs, text
+from runs import FINDERS, complaints, contents, count, differences, frames, interrupt, run, state_hash
+
+#: Seeds of the quick test, which takes each capability in some pairs, and of the full one, which takes all pairs
+QUICK_SEED = 1
+FULL_SEEDS = (1, 2, 3)
+#: Ranks that are drawn; None is the program without MPI. Seven take turns on few cores and are slow.
+RANKS = (None, None, 1, 2, 2, 3, 3, 7)
+ONE_RANK = (None, 1)
+#: How many pairs each capability is in at least, unless all pairs are tried
+TIMES = 2
+
+
+def some_pairs(seed):
+    """Pairs in which every capability is so many times."""
+    drawn = list(pairs())
+    random.Random(seed).shuffle(drawn)
+    times = Counter()
+    for two in drawn:
+        if two not in REFUSED and min(times[name] for name in two) < TIMES:
+            times.update(two)
+            yield two
+
+
+def pytest_generate_tests(metafunc):
+    if "seed" in metafunc.fixturenames:
+        full = metafunc.config.getoption("full")
+        cases = ([(two, seed) for seed in FULL_SEEDS for two in pairs() if two not in REFUSED] if full
+                 else [(two, QUICK_SEED) for two in some_pairs(QUICK_SEED)])
+        metafunc.parametrize("two, seed", cases, ids=[f"{'-'.join(two)}-{seed}" for two, seed in cases])
+
+
+def test_two_capabilities_have_one_hash(two, seed, matrix, tmp_path):
+    draw = random.Random(f"{two} {seed}")
+    namelist = tmp_path / "scene.nml"
+    namelist.write_text(text(two), encoding="utf-8")
+
+    def finder():
+        return "--set", f"neighbours.finder={draw.choice(FINDERS)}"
+
+    def machine():
+        return draw.choice(ONE_RANK if "exact_friction" in two else RANKS), draw.randint(1, 4)
+
+    whole, message = run(namelist, tmp_path / "whole", options=("--set", "neighbours.finder=all_pairs"))
+    assert complaints(message) == []
+    assert count(whole, "contacts") > 500
+    other, _ = run(namelist, tmp_path / "other", *machine(), finder())
+    assert state_hash(other) == state_hash(whole)
+    assert differences(contents(tmp_path / "whole"), contents(tmp_path / "other")) == []
+    folder = tmp_path / "parts"
+    same = finder()
+    step, _ = interrupt(folder, namelist, *machine(), same)
+    assert 0 < step < count(whole, "steps")
+    last, _ = run(namelist, folder, *machine(), ("--continue", *same))
+    assert state_hash(last) == state_hash(whole)
+    assert differences(frames(tmp_path / "whole"), frames(folder)) == []
+    matrix[two] = matrix.get(two, 0) + 3
+
+
+@pytest.mark.parametrize("two", REFUSED, ids="-".join)
+def test_what_does_not_go_together_is_refused(two, tmp_path):
+    (tmp_path / "scene.nml").write_text(text(two), encoding="utf-8")
+    _, message = run(tmp_path / "scene.nml", tmp_path / "result", code=2)
+    assert REFUSED[two] in message
+    assert not (tmp_path / "result").exists()
+
+
+def test_the_quick_sample_leaves_no_capability_out():
+    times = Counter(name for two in some_pairs(QUICK_SEED) for name in two)
+    assert times.keys() == CAPABILITIES.keys()
+    assert min(times.values()) >= TIMES
