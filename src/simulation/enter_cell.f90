@@ -145,8 +145,8 @@ contains
          do k = 1_ip, size(self%walls(w)%slots, kind=ip)
             associate (s => self%walls(w)%slots(k), bodies => self%bodies)
                if (allocated(error)) return
-               if (turns(self, w, s)) call refuse(self, s, 'turns, which its copies do not; leave out the angles of '// &
-                  'its table of motion, and loads along ''angle''', error)
+               if (turns(self, w, s)) call refuse(self, s, 'turns, which its copies do not; leave out the angles '// &
+                  'of its table of motion, and loads along ''angle''', error)
                do axis = 1, 2
                   if (allocated(error)) return
                   if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%folds(axis, s) > 0.0_wp) cycle
@@ -192,7 +192,7 @@ contains
             if (motion%kind == 'conveyor') cycle
             values = 0.0_wp
             if (allocated(motion%table)) values = greatest_values(motion%table)
-            moves_along = moves_along .or. abs(motion%velocity(axis)) + abs(motion%amplitude(axis)) + values(axis) > 0.0_wp
+            if (abs(motion%velocity(axis)) + abs(motion%amplitude(axis)) + values(axis) > 0.0_wp) moves_along = .true.
          end associate
       end do
    end function moves_along
@@ -216,8 +216,8 @@ contains
       character(len=*), intent(in) :: words
       type(error_t), allocatable, intent(inout) :: error
 
-      call raise(error, input_error, place_of(self%settings, 'cell', 'periodic')//': ''periodic'' in &cell: the fixed '// &
-         'body '//to_text(self%bodies%id(s))//' '//words)
+      call raise(error, input_error, place_of(self%settings, 'cell', 'periodic')//': ''periodic'' in &cell: the '// &
+         'fixed body '//to_text(self%bodies%id(s))//' '//words)
    end subroutine refuse
 
 end module polydem_enter_cell

@@ -68,7 +68,7 @@ CAPABILITIES = {
     "load": Capability(
         groups="&load name = 'press' wall = 'lid' direction = 'y' stress = -2e3 width = 0.1 mass = 3 ramp = 2e-3 /\n",
         needs_walls=True),
-    "gate": Capability(groups="&wall name = 'shelf' outline = 'rectangle' low = -0.03, -1e-3 high = 0.03, 1e-3"
+    "gate": Capability(groups="&wall name = 'shelf' outline = 'rectangle' low = -0.02, -1e-3 high = 0.02, 1e-3"
                               " vanish_at = 7e-3 /\n", needs_walls=True),
     "belt": Capability(groups="&motion name = 'belt' wall = 'floor' kind = 'conveyor' velocity = 2, 0 ramp = 3e-3 /\n",
                        needs_walls=True),
@@ -86,6 +86,7 @@ REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",
+    ("hunt_crossley", "materials"): "'restitution' in &material hard is not used",
 }
 
 

@@ -9,11 +9,12 @@ module trial
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
    use polydem_time_step, only: advance
    use polydem_wall, only: new_wall, wall_t
    implicit none
    private
-   public :: begin, steps, block_at
+   public :: begin, begin_scene, steps, block_at
 
    !> Entries of &forces of the model that most expected values are for: the area law, with damping of its rate alone
    character(len=*), parameter, public :: area_law = " law = 'area' tilt_damping = 0"
@@ -48,6 +49,21 @@ contains
       if (present(motion)) call new_wall(walls(1), [motion], bodies, moved)
       call start_simulation(settings, bodies, walls, simulation, error)
    end subroutine begin
+
+   !> Create the simulation of a whole namelist.
+   subroutine begin_scene(text, simulation, error)
+      !> Groups of the namelist
+      character(len=*), intent(in) :: text
+      !> Ready to advance
+      type(simulation_t), intent(out) :: simulation
+      !> What went wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(settings_t) :: settings
+      character(len=1) :: no_overrides(0)
+
+      call read_settings_text('trial.nml', text, no_overrides, settings, error)
+      if (.not. allocated(error)) call new_simulation(settings, simulation, error)
+   end subroutine begin_scene
 
    !> Advance by a number of steps, or until an error.
    subroutine steps(simulation, n, error)
