@@ -1,6 +1,7 @@
 """What models cost, from samples that are made up, and with a program that is a stand-in."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import pytest
@@ -47,7 +48,14 @@ def study(tmp_path):
     """A study without a program."""
     FakeStudy.calls.clear()
     (tmp_path / "out").mkdir()
+    (tmp_path / "inputs" / "bench").mkdir(parents=True)
+    (tmp_path / "inputs" / "bench" / "drum.nml").write_text("&scene name = 'drum' /\n", encoding="utf-8")
     return FakeStudy(tmp_path / "none", tmp_path / "inputs", tmp_path / "out")
+
+
+def scenes(study, models):
+    """Namelists that models are run with."""
+    return [study.scene(model) for model in models]
 
 
 def test_a_cost_is_the_median_of_the_ratios_within_turns():
@@ -80,15 +88,24 @@ def test_models_run_in_turns_and_an_interrupted_study_goes_on(study):
     samples = costs.measure_costs(study, 2, say=lambda _: None)
     assert [sample.model for sample in samples[: len(MODELS)]] == [model.name for model in MODELS]
     assert len(samples) == len(MODELS) * (3 + costs.WEIGHINGS + 1)
-    assert study.calls == ["bed.nml"] + ["bench/drum.nml"] * (len(samples) + len(MODELS))
+    # Instructions are the difference of two runs.
+    counts = [scene for scene in scenes(study, MODELS) for _ in range(2)]
+    assert study.calls == ["bed.nml", *counts, *scenes(study, MODELS) * (3 + costs.WEIGHINGS)]
     path = study.output / costs.FILE
     assert read_samples(path) == samples
     kept = path.read_text(encoding="utf-8").splitlines()[:5]
     path.write_text("\n".join(kept) + "\n", encoding="utf-8")
     study.calls.clear()
     assert costs.measure_costs(study, 2, say=lambda _: None) == samples
-    # The four samples that were kept are of instructions, each the difference of two runs.
-    assert study.calls == ["bench/drum.nml"] * (len(samples) + len(MODELS) - 8)
+    # The four samples that were kept are of instructions.
+    assert study.calls == [*counts[8:], *scenes(study, MODELS) * (3 + costs.WEIGHINGS)]
+
+
+def test_a_model_with_groups_has_a_namelist_of_its_own(study):
+    model = next(model for model in MODELS if model.groups)
+    text = Path(study.scene(model)).read_text(encoding="utf-8")
+    assert text == "&scene name = 'drum' /\n" + model.groups
+    assert study.scene(MODELS[0]) == "bench/drum.nml"
 
 
 def test_a_study_says_what_it_will_do_and_how_far_it_is(study, monkeypatch):

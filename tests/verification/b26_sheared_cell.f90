@@ -2,7 +2,7 @@
 !>
 !> Two bodies that meet across the sheared border move as in the plane, where the lower one has that of its copy.
 !> Energy closes with the work of the border, of second order in dt. In a steady flow this work is the shear stress in
-!> the cell, from the contacts and the fluctuations of velocities, times rate and area.
+!> the cell, from the contacts and the fluctuations of velocities, times rate and area, and the mean profile is linear.
 module b26_sheared_cell
    use outlines, only: pi
    use trial, only: begin, steps
@@ -156,10 +156,11 @@ contains
       type(simulation_t) :: cell
       type(balance_t) :: start, end
       type(error_t), allocatable :: error
-      real(wp) :: power, dt
+      real(wp) :: power, dt, wave(2)
       integer :: k
 
       dt = 2.0e-5_wp
+      wave = 0.0_wp
       call list_grains(list)
       call begin(groups(.true., dt), list, cell, error)
       if (.not. allocated(error)) call steps(cell, first, error)
@@ -169,13 +170,32 @@ contains
          if (allocated(error)) exit
          call steps(cell, 1, error)
          power = power + power_of_stress(cell)
+         if (modulo(k, 20) == 0) wave = wave + wave_of_profile(cell)*20.0_wp/real(n_steps, wp)
       end do
       call table%note_error(error)
       if (allocated(error)) return
       call compute_balance(cell, end)
       call table%expect_relative('power of the stress in the cell over that of the border', 1.0_wp, &
                                  dt*power/(end%wall_work - start%wall_work), merge(0.01_wp, 0.03_wp, n_steps > 100000))
+      call table%expect_absolute('wave in the mean profile of velocities, over the jump', 0.0_wp, norm2(wave), 0.03_wp)
    end subroutine compare_stress
+
+   !> First Fourier mode along y of the velocities along x that a linear profile leaves, over the jump, (2)
+   function wave_of_profile(cell) result(wave)
+      type(simulation_t), intent(in) :: cell
+      real(wp) :: wave(2), phase
+      integer(ip) :: s
+
+      wave = 0.0_wp
+      associate (bodies => cell%bodies)
+         do s = 1_ip, bodies%n
+            phase = 2.0_wp*pi*bodies%position(2, s)/side
+            wave = wave + bodies%mass(s)*[cos(phase), sin(phase)]* &
+               (bodies%velocity(1, s) - rate*(bodies%position(2, s) - 0.5_wp*side))
+         end do
+         wave = 2.0_wp*wave/(sum(bodies%mass)*rate*side)
+      end associate
+   end function wave_of_profile
 
    !> Shear stress in the cell times rate and area [W/m]
    real(wp) function power_of_stress(cell) result(power)

@@ -69,6 +69,8 @@ class Model:
     on: tuple
     #: Name of the model that it is compared with
     off: str = "nothing"
+    #: Groups that the namelist has in addition
+    groups: str = ""
 
 
 #: The models, each behind the one that it is compared with
@@ -88,6 +90,10 @@ MODELS = (
           "friction (Cundall-Strack)"),
     Model("friction (exact)", ("forces.friction=exact",)),
     Model("friction (exact to 1e-6)", ("forces.friction=exact", "forces.friction_tolerance=1e-6")),
+    Model("two materials", ("scene.material=grain", "scene.wall_material=steel"),
+          groups="&material name = 'grain' /\n&material name = 'steel' stiffness = 2e7 /\n"),
+    Model("cohesion", ("forces.cohesion=1",)),
+    Model("drag", ("forces.drag=0.1",)),
     Model("stop without direction", ("overlap.degenerate=stop",)),
     Model("compensated sums", ("integrate.accumulation=compensated",)),
     Model("Gear's integrator", ("integrate.scheme=gear",)),
@@ -142,6 +148,15 @@ class Study:
         command = [str(self.program), "run", str(self.inputs / namelist), "--force", "--threads", str(threads)]
         return command + [part for word in words for part in ("--set", word)]
 
+    def scene(self, model: Model) -> str:
+        """Name of the namelist of a model, relative to the inputs; one with more groups is written first."""
+        name = "bench/drum.nml"
+        if not model.groups:
+            return name
+        path = self.output.resolve() / "drum_with_groups.nml"
+        path.write_text((self.inputs / name).read_text(encoding="utf-8") + model.groups, encoding="utf-8")
+        return str(path)
+
     def run(self, namelist: str, folder: Path, overrides, **environment: str) -> Trajectory:
         """Run a scene and open its result."""
         command = self.command(namelist, folder, overrides, self.threads)
@@ -169,7 +184,7 @@ class Study:
 
     def sample(self, model: Model, kind: str, repeat: int) -> Sample:
         """One run with a model."""
-        scene, folder = "bench/drum.nml", self.output / "run"
+        scene, folder = self.scene(model), self.output / "run"
         if kind == "count":
             few, more = (self.count(scene, folder, self.overrides(model, *size)) for size in COUNTED)
             result = Trajectory(folder)
