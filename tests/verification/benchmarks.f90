@@ -29,6 +29,7 @@ module benchmarks
    use b24_cut_floor, only: run_cut_floor
    use b25_periodic_cell, only: run_periodic_cell
    use b26_sheared_cell, only: run_sheared_cell
+   use b27_sources, only: run_sources
    use s32_flat_impact, only: run_flat_impact
    use s33_corner_impact, only: run_corner_impact
    use s34_oblique_impact, only: run_oblique_impact
@@ -40,7 +41,7 @@ module benchmarks
    !> Names in the order in which they run
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
       'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B10', 'B11', 'B12', 'B13', &
-      'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24', 'B25', 'B26']
+      'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24', 'B25', 'B26', 'B27']
    !> Benchmarks without a short version
    character(len=8), parameter :: long_names(*) = [character(len=8) :: 'B17', 'B19', 'B20', 'B21']
 
@@ -114,6 +115,8 @@ contains
          call run_periodic_cell(table, thorough)
       case ('B26')
          call run_sheared_cell(table, thorough)
+      case ('B27')
+         call run_sources(table, thorough)
       end select
    end subroutine run_benchmark
 
