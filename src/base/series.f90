@@ -13,6 +13,8 @@ module polydem_series
 
    !> Rows of named values
    type :: series_t
+      !> Name of its fields in a checkpoint
+      character(len=16) :: name = 'series'
       !> Columns of the present row; the caller sets their values
       type(named_values_t) :: row
       !> Number of rows that are kept
@@ -27,6 +29,7 @@ module polydem_series
       procedure :: keep_row
       procedure :: drop_rows
       procedure :: serialize
+      procedure, private :: field_name
    end type series_t
 
 contains
@@ -96,16 +99,16 @@ contains
       integer :: n_columns
 
       n_rows = int(self%n, lp)
-      call serializer%field('/run/series_rows', n_rows, '1', 'rows of the series that no segment has yet')
+      call serializer%field(self%field_name('rows'), n_rows, '1', 'rows that no segment has yet')
       if (allocated(serializer%error)) return
       if (serializer%is_reading) then
          self%n = 0
          if (allocated(self%step)) deallocate (self%step, self%time, self%value)
          if (n_rows == 0_lp) return
-         call serializer%count_rows('/run/series_value', n_values)
+         call serializer%count_rows(self%field_name('value'), n_values)
          if (allocated(serializer%error)) return
          if (n_rows < 0_lp .or. n_rows > n_values .or. modulo(n_values, max(1_lp, n_rows)) /= 0_lp) then
-            call raise(serializer%error, input_error, '/run/series_value has no whole number of columns')
+            call raise(serializer%error, input_error, self%field_name('value')//' has no whole number of columns')
             return
          end if
          n_columns = int(n_values/n_rows)
@@ -120,9 +123,10 @@ contains
          value = reshape([spread(1.0_dp, 1, self%n), reshape(self%value(:, :self%n), [(n_columns - 1)*self%n])], &
                          [n_columns*self%n])
       end if
-      call serializer%field('/run/series_step', step, '1', 'their steps')
-      call serializer%seconds_field('/run/series_time', time, 'their times')
-      call serializer%seconds_field('/run/series_value', value, 'ones, then their values in the units of the columns')
+      call serializer%field(self%field_name('step'), step, '1', 'their steps')
+      call serializer%seconds_field(self%field_name('time'), time, 'their times')
+      call serializer%seconds_field(self%field_name('value'), value, &
+                                    'ones, then their values in the units of the columns')
       if (.not. serializer%is_reading .or. allocated(serializer%error)) return
       allocate (self%step(0), self%time(0), self%value(n_columns - 1, 0))
       call reserve(self, n_columns - 1, int(n_rows))
@@ -131,5 +135,15 @@ contains
       self%time(:self%n) = time
       self%value(:, :self%n) = reshape(value(self%n + 1:), [n_columns - 1, self%n])
    end subroutine serialize
+
+   !> Name of a field in a checkpoint
+   pure function field_name(self, field) result(name)
+      class(series_t), intent(in) :: self
+      !> Name of the field
+      character(len=*), intent(in) :: field
+      character(len=:), allocatable :: name
+
+      name = '/run/'//trim(self%name)//'_'//field
+   end function field_name
 
 end module polydem_series

@@ -1,10 +1,11 @@
 !> Forces on bodies that are no contacts, as part of the sums of all forces.
 module polydem_field_sums
+   use polydem_bodies, only: bodies_t
    use polydem_force_sums, only: force_sums_t, of_normal, sum_torque, sum_x, sum_y
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: reserve_field, add_field
+   public :: reserve_field, add_field, accelerate_by_fields
 
 contains
 
@@ -43,5 +44,22 @@ contains
          end associate
       end do
    end subroutine add_field
+
+   !> Add the accelerations by forces that are no contacts to those by gravity.
+   pure subroutine accelerate_by_fields(sums, bodies)
+      !> Sums with the forces that are no contacts, if there are any
+      type(force_sums_t), intent(in) :: sums
+      !> Bodies with the accelerations by gravity
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k
+
+      if (.not. allocated(sums%field)) return
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (s => bodies%free(k))
+            bodies%acceleration(:, s) = bodies%acceleration(:, s) + sums%field(1:2, s)*bodies%inverse_mass(s)
+            bodies%angular_acceleration(s) = sums%field(3, s)*bodies%inverse_inertia(s)
+         end associate
+      end do
+   end subroutine accelerate_by_fields
 
 end module polydem_field_sums

@@ -65,7 +65,7 @@ contains
                   instances(place)%name//' cannot be combined with name = '//quoted(settings%scene%name)// &
                   ' in &scene; leave out the name, or start from the parts of this scene, which check --expand prints')
             end do
-         else if (settings%scene%bodies_file == '' .and. size(settings%grains) == 0) then
+         else if (settings%scene%bodies_file == '' .and. size(settings%grains) + size(settings%source) == 0) then
             if (.not. scene%is_given .and. size(settings%wall) == 0) then
                call raise(error, input_error, scene%place//': the group &scene is missing; for example: '// &
                   example_of('scene'))

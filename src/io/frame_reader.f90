@@ -4,6 +4,7 @@ module polydem_frame_reader
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
+   use polydem_frame_columns, only: frame_columns_t, read_frame
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_result_files, only: segment_path
@@ -64,11 +65,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       integer(ip), allocatable :: id(:), fixed(:), start(:), material(:)
-      real(dp), allocatable :: shape(:, :), mass(:), inertia(:), position(:, :, :), angle(:, :), velocity(:, :, :), &
-         spin(:, :)
+      real(dp), allocatable :: shape(:, :), mass(:), inertia(:)
       real(wp), allocatable :: corners(:, :)
+      type(frame_columns_t) :: frame
       real(wp) :: c, s
-      integer(ip) :: k, v
+      integer(ip) :: j, k, v
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -79,31 +80,29 @@ contains
       call file%read('/bodies/mass', mass, error)
       call file%read('/bodies/inertia', inertia, error)
       if (list%has_materials) call file%read('/bodies/material', material, error)
-      call file%read('/frames/position', position, error, rows=[row, 1_lp])
-      call file%read('/frames/angle', angle, error, rows=[row, 1_lp])
-      call file%read('/frames/velocity', velocity, error, rows=[row, 1_lp])
-      call file%read('/frames/angular_velocity', spin, error, rows=[row, 1_lp])
+      if (.not. allocated(error)) call read_frame(file, row, id, frame, error)
       call file%close(error)
       if (allocated(error)) return
       if (.not. allocated(material)) material = spread(0_ip, 1, size(id))
-      if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1, size(position, 2), &
-               size(angle, 1), size(velocity, 2), size(spin, 1)] /= size(id))) then
+      if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1] /= size(id))) then
          call raise(error, input_error, path//': its data sets have different numbers of bodies')
          return
       end if
-      do k = 1_ip, size(id, kind=ip)
-         call sine_and_cosine(real(angle(k, 1), wp), s, c)
+      do j = 1_ip, size(frame%body, kind=ip)
+         k = frame%body(j)
+         call sine_and_cosine(real(frame%angle(j), wp), s, c)
          corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
          do v = 1_ip, size(corners, 2, kind=ip)
             corners(:, v) = [c*corners(1, v) - s*corners(2, v), s*corners(1, v) + c*corners(2, v)] &
-                            + real(position(:, k, 1), wp)
+                            + real(frame%position(:, j), wp)
          end do
          if (fixed(k) == 1_ip) then
             call list%append(corners, fixed=.true., id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp), &
                              material=material(k))
          else
-            call list%append(corners, velocity=real(velocity(:, k, 1), wp), angular_velocity=real(spin(k, 1), wp), &
-                             id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp), material=material(k))
+            call list%append(corners, velocity=real(frame%velocity(:, j), wp), &
+                             angular_velocity=real(frame%spin(j), wp), id=id(k), mass=real(mass(k), wp), &
+                             inertia=real(inertia(k), wp), material=material(k))
          end if
       end do
    end subroutine list_frame

@@ -63,7 +63,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       character(len=:), allocatable :: text
-      integer(lp), allocatable :: shape(:)
+      integer(lp), allocatable :: shape(:), start(:)
       real(dp), allocatable :: times(:)
       integer(ip) :: number
 
@@ -73,6 +73,8 @@ contains
          call file%open(segment_path(folder, number), error)
          call file%read('/frames/time', times, error)
          call file%shape_of('/bodies/id', shape, error)
+         if (allocated(start)) deallocate (start)
+         if (file%has('/frames/start', error)) call file%read('/frames/start', start, error)
          if (.not. allocated(error) .and. number == 1_ip) then
             if (file%has('/provenance/resolved_input', error)) call file%read('/provenance/resolved_input', text, error)
             if (allocated(text)) frames%scene = scene_of(text)
@@ -83,6 +85,7 @@ contains
             if (frames%n == 0_lp) frames%first = times(1)
             frames%last = times(size(times))
             frames%bodies = shape(1)
+            if (allocated(start)) frames%bodies = start(size(start)) - start(size(start) - 1)
          end if
          frames%n = frames%n + size(times, kind=lp)
          frames%n_segments = frames%n_segments + 1_lp

@@ -6,8 +6,9 @@ module polydem_trajectory_reader
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: is_folder
+   use polydem_frame_columns, only: frame_columns_t, read_frame
    use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_kinds, only: dp, ip, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_result_files, only: last_segment
    implicit none
    private
@@ -50,43 +51,45 @@ contains
       type(hdf5_file_t), intent(in) :: file
       type(body_list_t), intent(inout) :: list
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip), allocatable :: fixed(:), start(:)
-      real(dp), allocatable :: shape(:, :), position(:, :, :), angle(:, :)
+      integer(ip), allocatable :: id(:), fixed(:), start(:)
+      real(dp), allocatable :: shape(:, :), times(:)
       real(wp), allocatable :: corners(:, :)
+      type(frame_columns_t) :: frame
       real(wp) :: c, s
-      integer(ip) :: k, v, last
+      integer(ip) :: j, k, v
 
+      call file%read('/bodies/id', id, error)
       call file%read('/bodies/fixed', fixed, error)
       call file%read('/bodies/vertex_start', start, error)
       call file%read('/bodies/vertex', shape, error)
-      call file%read('/frames/position', position, error)
-      call file%read('/frames/angle', angle, error)
+      call file%read('/frames/time', times, error)
       if (allocated(error)) return
-      if (.not. fit(fixed, start, shape, position, angle)) then
+      if (.not. fit(id, fixed, start, shape) .or. size(times) == 0) then
          call raise(error, input_error, 'the data sets of its segment of a trajectory are inconsistent')
          return
       end if
-      last = size(angle, 2, kind=ip)
-      do k = 1_ip, size(fixed, kind=ip)
-         call sine_and_cosine(real(angle(k, last), wp), s, c)
+      call read_frame(file, size(times, kind=lp) - 1_lp, id, frame, error)
+      if (allocated(error)) return
+      do j = 1_ip, size(frame%body, kind=ip)
+         k = frame%body(j)
+         call sine_and_cosine(real(frame%angle(j), wp), s, c)
          corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
          do v = 1_ip, size(corners, 2, kind=ip)
             corners(:, v) = [c*corners(1, v) - s*corners(2, v), s*corners(1, v) + c*corners(2, v)] &
-                            + real(position(:, k, last), wp)
+                            + real(frame%position(:, j), wp)
          end do
          call list%append(corners, fixed=fixed(k) == 1_ip)
       end do
    end subroutine list_last_frame
 
-   !> Whether the shapes of the data sets of a segment are consistent, with at least one frame
-   pure logical function fit(fixed, start, shape, position, angle)
-      integer(ip), intent(in) :: fixed(:), start(:)
-      real(dp), intent(in) :: shape(:, :), position(:, :, :), angle(:, :)
+   !> Whether the shapes of the data sets of the bodies of a segment are consistent
+   pure logical function fit(id, fixed, start, shape)
+      integer(ip), intent(in) :: id(:), fixed(:), start(:)
+      real(dp), intent(in) :: shape(:, :)
       integer :: n
 
       n = size(fixed)
-      fit = size(start) == n + 1 .and. size(shape, 1) == 2 .and. size(angle, 1) == n .and. size(angle, 2) > 0 .and. &
-            size(position, 1) == 2 .and. size(position, 2) == n .and. size(position, 3) == size(angle, 2)
+      fit = size(id) == n .and. size(start) == n + 1 .and. size(shape, 1) == 2
       if (fit) fit = start(1) == 0_ip .and. start(n + 1) == size(shape, 2) .and. all(start(2:) >= start(:n))
    end function fit
 

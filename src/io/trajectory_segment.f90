@@ -12,6 +12,8 @@
 !>                  frame of the segment (optional)
 !>     /provenance  origin of the file
 !>
+!> If bodies enter or leave, /bodies and /frames have another form (`polydem_ragged_segment`).
+!>
 !> Indices count from 0. The normal of a contact is the integral of the outward normal over the part of the outline of
 !> the first body that is inside the second body. The force of a contact acts on the first body.
 !>
@@ -30,7 +32,7 @@ module polydem_trajectory_segment
    use polydem_series, only: series_t
    implicit none
    private
-   public :: write_bodies, add_frame, add_walls, add_contacts, add_balance, add_series
+   public :: write_bodies, write_surroundings, add_frame, add_walls, add_contacts, add_balance, add_series
 
    !> Number of vertices that one rank writes at once, so that it needs little memory
    integer(ip), parameter :: vertices_at_once = 100000_ip
@@ -68,6 +70,15 @@ contains
          call file%write('/bodies/material', int(block(1, :), ip), error, '1', &
                          'material: position among the groups &material of the namelist, 0: none of them', part)
       end if
+      call write_surroundings(file, bodies, error)
+   end subroutine write_bodies
+
+   !> Write the periodic cell and the identifiers of the fixed bodies, if there are any.
+   subroutine write_surroundings(file, bodies, error)
+      type(hdf5_file_t), intent(inout) :: file
+      type(bodies_t), intent(in) :: bodies
+      type(error_t), allocatable, intent(inout) :: error
+
       if (bodies%cell%is_periodic) then
          call file%write('/cell/low', real(bodies%cell%low, dp), error, 'm', 'lower left corner of the periodic cell')
          call file%write('/cell/size', real(bodies%cell%size, dp), error, 'm', &
@@ -76,7 +87,7 @@ contains
       if (.not. any(bodies%fixed(:bodies%n))) return
       call file%write('/walls/id', pack(bodies%id(:bodies%n), bodies%fixed(:bodies%n)), error, '1', &
                       'identifier of each fixed body, ascending')
-   end subroutine write_bodies
+   end subroutine write_surroundings
 
    !> Write the masses and moments of inertia of all bodies.
    subroutine write_masses(file, comm, bodies, blocks, error)
@@ -294,14 +305,16 @@ contains
       !> Rows, the same on all ranks
       type(series_t), intent(in) :: series
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: group
       integer :: k
 
       if (series%n == 0) return
-      call file%write('/series/step', series%step(:series%n), error, '1', 'number of the time step', rows=many_rows)
-      call file%write('/series/time', series%time(:series%n), error, 's', 'simulated time', rows=many_rows)
+      group = '/'//trim(series%name)//'/'
+      call file%write(group//'step', series%step(:series%n), error, '1', 'number of the time step', rows=many_rows)
+      call file%write(group//'time', series%time(:series%n), error, 's', 'simulated time', rows=many_rows)
       do k = 1, size(series%row%name)
          associate (row => series%row)
-            call file%write('/series/'//trim(row%name(k)), series%value(k, :series%n), error, trim(row%unit(k)), &
+            call file%write(group//trim(row%name(k)), series%value(k, :series%n), error, trim(row%unit(k)), &
                             trim(row%meaning(k)), rows=many_rows)
          end associate
       end do

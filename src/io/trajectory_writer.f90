@@ -18,10 +18,12 @@ module polydem_trajectory_writer
    use polydem_manifest, only: manifest_t
    use polydem_named_values, only: named_values_t
    use polydem_provenance, only: provenance_t, write_provenance
+   use polydem_ragged_segment, only: add_ragged_frame, append_bodies, ragged_rows_t
    use polydem_result_files, only: open_suffix, segment_path
    use polydem_series, only: series_t
    use polydem_time_limit, only: time_limit_t
-   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_series, add_walls, write_bodies
+   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_series, add_walls, write_bodies, &
+      write_surroundings
    implicit none
    private
    public :: trajectory_writer_t
@@ -47,6 +49,10 @@ module polydem_trajectory_writer
       integer(ip) :: n_frames = 0_ip
       !> Steps of the first and the last frame in the open segment
       integer(lp) :: steps(2) = 0_lp
+      !> Whether bodies enter or leave
+      logical :: is_ragged = .false.
+      !> What the open segment then has of bodies and frames
+      type(ragged_rows_t) :: rows
       !> Number of contacts in the open segment
       integer(lp) :: n_contacts = 0_lp
    contains
@@ -60,7 +66,7 @@ contains
 
    !> Prepare for writing. The folder is created if necessary. It must not contain a result other than the segments of
    !> earlier attempts of the same run.
-   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number, comm)
+   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number, comm, is_ragged)
       class(trajectory_writer_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -72,7 +78,10 @@ contains
       integer(ip), intent(in), optional :: last_number
       !> Communicator of the run; absent: this rank writes alone
       class(communicator_t), intent(in), optional :: comm
+      !> Whether bodies enter or leave; default: no
+      logical, intent(in), optional :: is_ragged
 
+      if (present(is_ragged)) self%is_ragged = is_ragged
       call choose_communicator(self%comm, comm)
       self%folder = folder
       self%capacity = max(1_ip, frames_per_segment)
@@ -86,7 +95,7 @@ contains
 
    !> Write a frame and flush it. After a failure the segment keeps its temporary name. Either all frames have
    !> `contacts` or none; likewise for `row`.
-   subroutine write_frame(self, step, time, bodies, error, contacts, row, manifest, series)
+   subroutine write_frame(self, step, time, bodies, error, contacts, row, manifest, series, departures)
       class(trajectory_writer_t), intent(inout) :: self
       !> Number of the step
       integer(lp), intent(in) :: step
@@ -103,6 +112,8 @@ contains
       type(manifest_t), intent(inout), optional :: manifest
       !> Rows of the series since the last frame, which are written before this frame and dropped
       type(series_t), intent(inout), optional :: series
+      !> Departures since the last frame, likewise
+      type(series_t), intent(inout), optional :: departures
       type(time_limit_t) :: limit
       integer(ip) :: number
       integer(lp) :: room
@@ -110,6 +121,7 @@ contains
       number = merge(self%number, self%number + 1_ip, self%is_open)
       room = room_for(bodies)
       if (present(series)) room = room + room_for_series(series)
+      if (present(departures)) room = room + room_for_series(departures)
       if (self%comm%size > 1_ip) call limit%set(segment_path(self%folder, number)//open_suffix, self%comm%rank, room)
       if (self%is_open) then
          call reserve_on_all_ranks(self%comm, segment_path(self%folder, self%number)//open_suffix, room, error)
@@ -117,12 +129,14 @@ contains
          call open_segment(self, bodies, room, error, manifest)
       end if
       if (.not. allocated(error) .and. present(series)) call write_series(self, bodies, series, error)
+      if (.not. allocated(error) .and. present(departures)) call write_series(self, bodies, departures, error)
       if (.not. allocated(error)) call fill_frame(self, step, time, bodies, error, contacts, row)
       if (allocated(error)) then
          call self%file%abandon(error)
          self%is_open = .false.
       else
          if (present(series)) call series%drop_rows(step)
+         if (present(departures)) call departures%drop_rows(step)
          if (self%n_frames == 0_ip) self%steps(1) = step
          self%steps(2) = step
          self%n_frames = self%n_frames + 1_ip
@@ -141,7 +155,12 @@ contains
       type(contacts_t), intent(in), optional :: contacts
       type(named_values_t), intent(in), optional :: row
 
-      call add_frame(self%file, self%comm, step, real(time, dp), bodies, error)
+      if (self%is_ragged) then
+         call append_bodies(self%file, self%comm, bodies, self%rows, error)
+         call add_ragged_frame(self%file, self%comm, step, real(time, dp), bodies, self%rows, error)
+      else
+         call add_frame(self%file, self%comm, step, real(time, dp), bodies, error)
+      end if
       call add_walls(self%file, bodies, error)
       if (present(contacts)) call add_contacts(self%file, self%comm, self%n_contacts, bodies, contacts, error)
       if (present(row)) call add_balance(self%file, row, error)
@@ -194,7 +213,12 @@ contains
       if (allocated(error)) return
       self%is_open = .true.
       call expect_contacts(self, bodies)
-      call write_bodies(self%file, self%comm, bodies, error)
+      self%rows = ragged_rows_t()
+      if (self%is_ragged) then
+         call write_surroundings(self%file, bodies, error)
+      else
+         call write_bodies(self%file, self%comm, bodies, error)
+      end if
    end subroutine open_segment
 
    !> Choose the size of chunks such that it is small enough for the contacts of loose grains, and large enough for

@@ -6,11 +6,12 @@
 !> that it finds again get their contact history. A hash of the bodies at the start guards against the checkpoint of
 !> another run.
 module polydem_checkpoint_fields
+   use polydem_balance_state, only: serialize_balance, serialize_contributions
    use polydem_begin_stage, only: continue_stages
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
-   use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_exchange_bodies, only: find_leaving
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_monitor, only: serialize_monitor, monitor_t
@@ -111,6 +112,8 @@ contains
          if (s%settings%output%energy_balance) call serialize_balance(s%energy_balance, serializer)
          if (.not. serializer%is_reading) call find_release(s)
          call s%named%serialize_gates(serializer)
+         if (.not. serializer%is_reading) call find_leaving(s)
+         if (allocated(s%traffic)) call s%traffic%serialize(serializer)
          if (allocated(s%loads)) call serialize_loads(s%loads, serializer)
          if (s%settings%output%series_interval > 0.0_wp) then
             call s%record%serialize(serializer)

@@ -150,6 +150,19 @@ contains
       if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%walk%walls, s%bodies)
+         if (allocated(s%traffic)) then
+            call s%traffic%departures%drop_rows(run%earlier%last_frame)
+            if (output%contacts) then
+               call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, &
+                                               run%manifest, s%series, s%traffic%departures)
+            else
+               call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, &
+                                               manifest=run%manifest, series=s%series, &
+                                               departures=s%traffic%departures)
+            end if
+            run%last_frame = s%step
+            return
+         end if
          ! The row has no entries if the run computes no energy balance.
          if (output%contacts) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, run%manifest, &

@@ -1,6 +1,7 @@
 !> Choice of the time step, and the number of steps.
 module polydem_choose_step
    use polydem_begin_stage, only: find_last_steps
+   use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
@@ -27,9 +28,11 @@ contains
    !> Use dt of the settings, or that of the simulation if it has one, or compute it: a fraction of the stable time
    !> step, reduced to divide the duration evenly, or to three digits if the run has stages.
    !> Collective; all ranks get the same error.
-   subroutine choose_step(self, error)
+   subroutine choose_step(self, sample, error)
       !> The simulation with settings, ranks, bodies and integrator; `dt`, `n_steps` and `expected_stable_step` are set
       type(simulation_t), intent(inout) :: self
+      !> Bodies that will enter, the same on all ranks
+      type(bodies_t), intent(in) :: sample
       !> Allocated if no step can be chosen, or if the number of steps is not allowed
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
@@ -57,6 +60,7 @@ contains
       self%expected%depth = found(1)
       self%expected%length = found(2)
       self%expected%damped = found(3)
+      if (sample%n > 0_ip) call consider_sample(self, law, sample, has_free(1))
       associate (settings => self%settings%integrate, duration => longest_run(self%settings))
          if (settings%dt > 0.0_wp) self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then
@@ -74,19 +78,48 @@ contains
             end if
          end if
          steps = duration/self%dt
-         if (.not. (steps >= 0.5_wp .and. steps < most_steps)) then
-            call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
-                       to_text(duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
-                       to_text(steps)//' steps, but only 1 to '//to_text(most_steps)// &
-                       ' are allowed. Change duration, dt, safety_factor or speed in &integrate'// &
-                       overrides_of(self%settings, 'integrate'))
-            return
-         end if
+         call check_number(self, duration, steps, error)
+         if (allocated(error)) return
          self%n_steps = nint(steps, lp)
          if (self%stages%number > 0_ip) call find_last_steps(self)
       end associate
       call check_rate(self, error)
    end subroutine choose_step
+
+   !> Check the number of steps.
+   subroutine check_number(self, duration, steps, error)
+      type(simulation_t), intent(in) :: self
+      !> Simulated time [s], and its number of steps
+      real(wp), intent(in) :: duration, steps
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (steps >= 0.5_wp .and. steps < most_steps) return
+      call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
+                 to_text(duration)//' s with dt = '//to_text(self%dt)//' s requires '//to_text(steps)// &
+                 ' steps, but only 1 to '//to_text(most_steps)//' are allowed. Change duration, dt, safety_factor '// &
+                 'or speed in &integrate'//overrides_of(self%settings, 'integrate'))
+   end subroutine check_number
+
+   !> Take the stable step of bodies that will enter, if it is shorter.
+   subroutine consider_sample(self, law, sample, has_free)
+      type(simulation_t), intent(inout) :: self
+      type(force_law_t), intent(in) :: law
+      type(bodies_t), intent(in) :: sample
+      !> 1 if there is a free body
+      real(wp), intent(inout) :: has_free
+      real(wp) :: stable, depth, length, damped
+      integer(ip) :: critical
+
+      call stable_step_of_shapes(law, self%integrator%stability(), sample, self%expected%speed, stable, critical, &
+                                 depth, length, damped, mobility_of_walls(self))
+      has_free = 1.0_wp
+      if (stable >= self%expected_stable_step) return
+      self%expected_stable_step = stable
+      self%expected%body = 0_lp
+      self%expected%depth = depth
+      self%expected%length = length
+      self%expected%damped = damped
+   end subroutine consider_sample
 
    !> Check that no force that is no contact changes velocities by much in a step.
    subroutine check_rate(self, error)

@@ -1,9 +1,9 @@
 !> The speed at which bodies are expected to meet, for the choice of the time step.
 !>
 !> It is the greatest of three: the difference of the velocities of any two bodies at the start, including their spins;
-!> the speed after a fall of the highest free body to the lowest point of the scene (with moving walls: through the
-!> whole extent); and the greatest speed of a wall. Each is an upper bound that does not depend on the frame of
-!> reference.
+!> the speed after a fall of the highest free body or source to the lowest point of the scene or the top of a sink (with
+!> moving walls: through the whole extent); and the greatest speed of a wall. Each is an upper bound that does not
+!> depend on the frame of reference.
 module polydem_expected_speed
    use polydem_elementary, only: hypotenuse
    use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
@@ -56,6 +56,7 @@ contains
       real(wp), intent(out) :: speed
       real(wp) :: least(2), greatest(2), spin
       integer(ip) :: s
+      integer :: k
 
       least = huge(1.0_wp)
       greatest = -huge(1.0_wp)
@@ -66,6 +67,10 @@ contains
             greatest = max(greatest, bodies%velocity(:, s) + spin)
          end do
       end associate
+      do k = 1, size(self%settings%source)
+         least = min(least, self%settings%source(k)%velocity, 0.0_wp)
+         greatest = max(greatest, self%settings%source(k)%velocity, 0.0_wp)
+      end do
       call reduce_to_least(self%comm, least)
       call reduce_to_greatest(self%comm, greatest)
       speed = 0.0_wp
@@ -80,6 +85,7 @@ contains
       real(wp), intent(out) :: speed
       real(wp) :: strength, up(2), highest(1), lowest(1), height
       integer(ip) :: s, v
+      integer :: k
 
       speed = 0.0_wp
       associate (bodies => self%bodies)
@@ -94,6 +100,18 @@ contains
                lowest = min(lowest, height)
                if (.not. bodies%fixed(s) .or. size(self%walls) > 0) highest = max(highest, height)
             end do
+         end do
+         do k = 1, size(self%settings%source)
+            associate (low => self%settings%source(k)%low, high => self%settings%source(k)%high)
+               highest = max(highest, sum(max(up*low, up*high)))
+               lowest = min(lowest, sum(min(up*low, up*high)))
+            end associate
+         end do
+         ! Bodies fall on as far as the sinks.
+         do k = 1, size(self%settings%sink)
+            associate (low => self%settings%sink(k)%low, high => self%settings%sink(k)%high)
+               lowest = min(lowest, sum(max(up*low, up*high)))
+            end associate
          end do
          call reduce_to_greatest(self%comm, highest)
          call reduce_to_least(self%comm, lowest)

@@ -1,9 +1,9 @@
 !> Bodies packed with their whole state, while ranks redistribute them or the set of bodies changes: constant fields,
 !> variable fields, state of the integrator and channels of the energy balance.
 module polydem_packed_state
+   use polydem_balance_state, only: serialize_contributions
    use polydem_body_fields, only: serialize_bodies
    use polydem_communicator, only: communicator_t
-   use polydem_energy_balance, only: serialize_contributions
    use polydem_kinds, only: ip
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, join_packed, pack_bodies, unpack_bodies

@@ -4,14 +4,18 @@
 !> ones; the pairs keep their contact history until the next step finds them again. What depends on the bodies is built
 !> anew, as in a restart from a checkpoint (`settle_bodies`). On several ranks the next step redistributes the bodies.
 !>
-!> Slots and global indices change; identifiers do not, and none is used twice. The energy balance does not know what
-!> the bodies bring and take.
+!> Slots and global indices change; identifiers do not, and none is used twice. The caller tells the energy balance what
+!> the bodies bring and take (`polydem_changed_bodies`); the channels of new bodies begin as at time 0.
 module polydem_replace_bodies
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
+   use polydem_changed_bodies, only: start_entering
+   use polydem_energy_balance, only: energy_balance_t
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_field_sums, only: accelerate_by_fields
+   use polydem_force_sums, only: begin_sums, force_sums_t, total_forces
+   use polydem_kinds, only: ip, lp
    use polydem_local_data, only: limit_displacement, rebuild_local_data
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_ownership, only: owns_body
@@ -34,13 +38,15 @@ contains
       !> Whether each body stays, (slot); the same on all ranks for a fixed body, and not read for bodies in the halo
       logical, intent(in) :: kept(:)
       !> New bodies as `new_bodies` makes them: the free ones of this rank, and all fixed ones. They get the next
-      !> identifiers and, if free, the acceleration of their weight. On return they are unchanged otherwise
+      !> identifiers and, if free, the acceleration of all forces but those of contacts. On return they are unchanged
+      !> otherwise
       type(bodies_t), intent(inout) :: added
       !> Allocated if there are no identifiers left
       type(error_t), allocatable, intent(inout) :: error
       type(packed_state_t) :: packed
       type(packed_bodies_t) :: new
       type(migration_buffer_t) :: columns
+      type(energy_balance_t) :: entering
       integer(ip), allocatable :: removed(:), slots(:)
       integer(ip) :: s
 
@@ -56,7 +62,7 @@ contains
       if (added%n_all > 0_ip) then
          if (allocated(self%bodies%material) .and. .not. allocated(added%material)) &
             allocate (added%material(added%n), source=0_ip)
-         call start_added(self, added)
+         call start_added(self, added, entering)
          call set_cell(added, self%bodies%cell)
          slots = [(s, s=1_ip, added%n)]
          call pack_bodies(added, slots, new)
@@ -68,6 +74,12 @@ contains
       if (added%n_all > 0_ip) then
          call columns%restore_to(slots(packed%columns%n_rows + 1_ip:))
          call serialize_bodies(columns, self%bodies)
+         slots = slots(packed%columns%n_rows + 1_ip:)
+         do s = 1_ip, merge(size(slots, kind=ip), 0_ip, self%settings%output%energy_balance)
+            self%energy_balance%power_sum(:, slots(s)) = entering%power_sum(:, s)
+            self%energy_balance%torque(slots(s)) = entering%torque(s)
+            self%energy_balance%wall_sum(:, slots(s)) = entering%wall_sum(:, s)
+         end do
       end if
       call settle_bodies(self, error)
    end subroutine replace_bodies
@@ -136,18 +148,21 @@ contains
    end subroutine renumber
 
    !> Give new bodies the state of bodies at the end of a step that touch no other.
-   subroutine start_added(self, added)
+   subroutine start_added(self, added, entering)
       type(simulation_t), intent(in) :: self
       type(bodies_t), intent(inout) :: added
-      integer(ip) :: k
+      !> Their channels of the energy balance
+      type(energy_balance_t), intent(out) :: entering
+      type(force_sums_t) :: sums
 
-      do k = 1_ip, size(added%free, kind=ip)
-         associate (s => added%free(k))
-            added%force(:, s) = added%mass(s)*self%settings%forces%gravity
-            added%torque(s) = 0.0_wp
-         end associate
-      end do
-      call self%integrator%start_accelerations(self%settings%forces%gravity, added)
+      associate (gravity => self%settings%forces%gravity)
+         call begin_sums(added%n, sums)
+         call self%body_forces%apply(added, sums)
+         call total_forces(gravity, sums, added)
+         call self%integrator%start_accelerations(gravity, added)
+         if (.not. self%integrator%starts_from_forces) call accelerate_by_fields(sums, added)
+         if (self%settings%output%energy_balance) call start_entering(gravity, added, sums, entering)
+      end associate
    end subroutine start_added
 
 end module polydem_replace_bodies

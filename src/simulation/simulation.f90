@@ -22,6 +22,7 @@ module polydem_simulation
    use polydem_series, only: series_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
+   use polydem_traffic, only: traffic_t
    use polydem_wall, only: wall_t
    use polydem_wall_energy, only: add_loads
    use polydem_wall_load, only: energies_of_loads, wall_load_t
@@ -85,6 +86,8 @@ module polydem_simulation
       type(wall_record_t) :: record
       !> Rows of the series that no file has yet
       type(series_t) :: series
+      !> Sources and sinks; not allocated if there are none
+      type(traffic_t), allocatable :: traffic
       !> Maker of the bounding boxes
       type(box_maker_t) :: maker
       !> Bounding boxes

@@ -39,6 +39,11 @@ contains
       call collect_counts(self)
       call counters%set('steps', self%step)
       call counters%set('bodies', int(self%bodies%n_all, lp))
+      if (allocated(self%traffic)) then
+         call counters%set('bodies entered', sum(self%traffic%sources%entered), over_steps)
+         call counters%set('bodies departed', sum(self%traffic%sinks%departed), over_steps)
+         call counters%set('entries without room', sum(self%traffic%sources%blocked), over_steps)
+      end if
       call counters%set('boxes', counts(1))
       call counters%set('pairs began', self%sums(sum_began), over_steps)
       call counters%set('pairs ended', self%sums(sum_ended), over_steps)

@@ -4,6 +4,8 @@ module polydem_start_simulation
    use polydem_bodies, only: bodies_t
    use polydem_body_forces, only: choose_body_forces
    use polydem_box_maker, only: update_boxes
+   use polydem_changed_bodies, only: expect_changes
+   use polydem_check_traffic, only: check_traffic, draw_sample
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_choose_step, only: choose_step
    use polydem_communicator, only: communicator_t
@@ -11,8 +13,8 @@ module polydem_start_simulation
    use polydem_enter_cell, only: check_constraint, enter_cell
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
+   use polydem_field_sums, only: accelerate_by_fields
    use polydem_force_law, only: check_law
-   use polydem_force_sums, only: force_sums_t
    use polydem_global_reductions, only: find_median, sum_exactly
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
@@ -24,6 +26,7 @@ module polydem_start_simulation
    use polydem_simulation, only: simulation_t
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
+   use polydem_traffic, only: new_traffic
    use polydem_wall_load, only: set_masses
    implicit none
    private
@@ -55,6 +58,7 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
+      type(bodies_t) :: sample
       real(wp) :: median_diameter
 
       call choose_instruction_set(self%bodies%isa, error)
@@ -65,13 +69,17 @@ contains
       call enter_cell(self, error)
       if (allocated(error)) return
       call prepare_stages(self)
+      call new_traffic(self%settings, self%traffic)
       call new_integrator(settings%integrate, self%integrator)
       call choose_all_fields(self)
       if (allocated(self%loads)) call prepare_loads(self)
-      call choose_step(self, error)
+      call draw_sample(self, sample, error)
+      if (allocated(error)) return
+      call choose_step(self, sample, error)
       if (allocated(error)) return
       call self%body_forces%configure(self%settings%forces)
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
+      if (median_diameter >= huge(1.0_wp)) call find_median(self%comm, sample%diameter, median_diameter)
       call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, self%bodies%cell)
       if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
       if (.not. allocated(error)) call check_constraint(self, error)
@@ -84,6 +92,7 @@ contains
       call continue_stages(self, error)
       call move_walls(self, 0.0_wp)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      if (.not. allocated(error)) call check_traffic(self, error)
       call redistribute(self, .false., error)
       call self%comm%all_reduce_error(error)
    end subroutine place_bodies
@@ -105,6 +114,7 @@ contains
          call self%record%start(self%named, self%bodies, self%walk%walls)
       if (self%settings%output%energy_balance) call start_energy_balance( &
          self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%force_sums, self%walk%walls)
+      if (allocated(self%traffic)) call expect_changes(self%energy_balance)
       self%timers = timers_t()
    end subroutine start_forces
 
@@ -137,7 +147,7 @@ contains
       integer :: c
 
       call self%integrator%start_accelerations(self%settings%forces%gravity, self%bodies)
-      if (.not. self%integrator%starts_from_forces) call add_fields(self%force_sums, self%bodies)
+      if (.not. self%integrator%starts_from_forces) call accelerate_by_fields(self%force_sums, self%bodies)
       call self%integrator%start(self%bodies)
       ! A scheme that ignores the forces at time 0 has no contact history before its first step.
       if (self%integrator%starts_from_forces .or. .not. allocated(self%history%column)) return
@@ -145,20 +155,5 @@ contains
          if (self%history%column(c)%kind%zero_is_new) self%history%column(c)%value = 0.0_wp
       end do
    end subroutine start_integration
-
-   !> Add the accelerations by forces that are no contacts to those by gravity.
-   pure subroutine add_fields(sums, bodies)
-      type(force_sums_t), intent(in) :: sums
-      type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k
-
-      if (.not. allocated(sums%field)) return
-      do k = 1_ip, size(bodies%free, kind=ip)
-         associate (s => bodies%free(k))
-            bodies%acceleration(:, s) = bodies%acceleration(:, s) + sums%field(1:2, s)*bodies%inverse_mass(s)
-            bodies%angular_acceleration(s) = sums%field(3, s)*bodies%inverse_inertia(s)
-         end associate
-      end do
-   end subroutine add_fields
 
 end module polydem_start_simulation

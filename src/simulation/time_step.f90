@@ -9,6 +9,7 @@ module polydem_time_step
    use polydem_contact_walk, only: walk_contacts
    use polydem_energy_balance, only: begin_step
    use polydem_errors, only: error_t, raise, run_error
+   use polydem_exchange_bodies, only: exchange_bodies
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_prediction, only: predict_bodies, predict_border, yield_walls
@@ -37,6 +38,7 @@ contains
       logical :: has_left
 
       call remove_walls(self, error)
+      if (allocated(self%traffic) .and. .not. allocated(error)) call exchange_bodies(self, error)
       if (allocated(error)) return
       self%step = self%step + 1_lp
       call begin_step(self%energy_balance)
@@ -131,6 +133,9 @@ contains
 
       needs_table = .true.
       if (present(tabulate)) needs_table = tabulate .or. allocated(self%law%constraint)
+      ! The elastic energy of the contacts of bodies that leave
+      if (allocated(self%traffic)) &
+         needs_table = needs_table .or. self%traffic%has_departures(self%step)
    end function needs_table
 
    !> Add forces on bodies that are no contacts, and the forces of a velocity constraint, if there are any.

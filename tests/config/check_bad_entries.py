@@ -63,6 +63,8 @@ PARTS = {
 }
 #: Required entries of groups that need a scene of parts
 REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x"}, "stage": {},
+            "source": {"low": "0.3, 0.3", "high": "0.5, 0.5", "count": "9"},
+            "sink": {"low": "-1, -3", "high": "2, -2.5"},
             "contact_pair": {"materials": f"'{NAME}', '{NAME}'", "friction_coefficient": "0.1"}}
 #: What is not a number, or not one number
 NO_NUMBERS = ("'text'", "word", ".true.", "nan", "NaN", "inf", "-inf", "Infinity", "", "1 2 3", "1, 2, 3", ",", "1,,2",
@@ -154,6 +156,8 @@ def with_required(row):
             entries.update({"duration": "1"} if until == "duration" else {"longest": "1", "below": "1"})
             entries.update({"wall": f"'{NAME}'", "opposite": f"'{NAME}'"} if until == "strain" else {})
             entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
+        if row.group == "source":
+            entries.update(PARTS["shape"][entries.setdefault("shape", "ellipse")])
         if entries.get("direction") == "angle":
             entries["torque"] = "1"
         groups = {**({} if row.group == "cell" else parts), row.group: entries}

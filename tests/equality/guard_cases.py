@@ -74,6 +74,11 @@ GUARDS = {
 NAME = "one"
 #: Beginnings of the entries of parts, which need a scene of parts
 PARTS = (f"grains.{NAME}.", f"wall.{NAME}.")
+#: Entries of sources and sinks
+TRAFFIC = tuple(f"{group}.{NAME}.{key}" for group, keys in {
+    "source": "low high rate count interval stage velocity corners short_axis long_axis diameter width height outline "
+              "angle size_ratio material density seed",
+    "sink": "low high interval stage"}.items() for key in keys.split())
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
 VARIED = {
     "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.packing": None, "scene.corners_min": "3",
@@ -108,6 +113,7 @@ VARIED = {
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
     "cell.shear_rate": None, "cell.shear_ramp": None, "wall.one.corners": "6",
     "motion.one.stage": None, "load.one.stage": None,
+    **dict.fromkeys(TRAFFIC, None),
     "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
     "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
@@ -154,6 +160,7 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
              **dict.fromkeys(("motion.one.stage", "load.one.stage",
                                "scene.start_from", "stage.one.wall", "stage.one.opposite"),
                              "check_stages.py"),
+             **dict.fromkeys(TRAFFIC, "tests/ranks: scene flow"),
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
              "cell.shear_ramp": "as cell.shear_rate", "grains.one.packing": "as scene.packing",
@@ -161,7 +168,8 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
-UNTRIED = {("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
+UNTRIED = {("source.one.shape", "regular"), ("source.one.shape", "rectangle"), ("source.one.shape", "outline"),
+           ("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
            ("stage.one.until", "strain"), ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"),
            ("grains.one.arrangement", "column")}
 

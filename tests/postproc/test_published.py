@@ -37,6 +37,7 @@ OTHERS = {
     "inputs/glossary.md",
     "inputs/log.md",
     "inputs/parts.md",
+    "inputs/sources.md",
     "inputs/stages.md",
     "inputs/walls.md",
     "src/README.md",

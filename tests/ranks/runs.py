@@ -79,6 +79,8 @@ def frames(folder):
                 found[f"frame {number}: {type(part).__name__}.{name}"] = getattr(value, "tobytes", lambda: value)()
     for name, values in result.energy_balance.items():
         found[f"energy balance: {name}"] = values.tobytes()
+    for name, values in result.departures.items():
+        found[f"departures: {name}"] = values.tobytes()
     for name, values in result.time_series.items():
         found[f"series: {name}"] = values.tobytes()
     assert found, f"{folder} holds no frame"

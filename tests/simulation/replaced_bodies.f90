@@ -36,8 +36,8 @@ program replaced_bodies
       'friction_coefficient = 0.4 / &integrate dt = 2e-5 duration = 1 / &decomposition margin = 2e-3 /'
    !> Finders and schemes of integration that are tried
    character(len=*), parameter :: finders(3) = [character(len=16) :: 'two_level', 'sort_and_sweep', 'verlet']
-   character(len=*), parameter :: schemes(3) = [character(len=40) :: 'integrate.scheme=velocity_verlet', &
-      'integrate.scheme=gear', 'integrate.accumulation=compensated']
+   character(len=*), parameter :: schemes(4) = [character(len=40) :: 'integrate.scheme=velocity_verlet', &
+      'integrate.scheme=gear', 'integrate.accumulation=compensated', 'forces.drag=30']
    !> Rows and columns of the heap, and number of bodies of the pile: the heap and three walls
    integer(ip), parameter :: n_rows = 6_ip, n_columns = 7_ip, n_pile = n_rows*n_columns + 3_ip
    !> Steps of a run, and the step before which bodies are replaced

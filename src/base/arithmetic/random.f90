@@ -26,6 +26,8 @@ module polydem_random
       procedure :: between
       procedure :: whole
       procedure :: normal
+      procedure :: state
+      procedure :: set_state
    end type random_t
 
 contains
@@ -87,5 +89,23 @@ contains
       radius = sqrt(-2.0_wp*logarithm(self%uniform()))
       normal = radius*cosine(two_pi*self%uniform())
    end function normal
+
+   !> The state of the stream, for a checkpoint
+   pure function state(self)
+      class(random_t), intent(in) :: self
+      integer(lp) :: state(6)
+
+      state = [self%s1, self%s2]
+   end function state
+
+   !> Set the state of the stream.
+   pure subroutine set_state(self, state)
+      class(random_t), intent(inout) :: self
+      !> A state; what no stream can have is brought into its range
+      integer(lp), intent(in) :: state(6)
+
+      self%s1 = modulo(state(1:3), m1)
+      self%s2 = modulo(state(4:6), m2)
+   end subroutine set_state
 
 end module polydem_random

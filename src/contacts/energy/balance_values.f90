@@ -28,6 +28,10 @@ contains
          call row%set('load_damping_work', balance%load_damping_work, 'J/m', 'work of the damping of these walls')
          call row%set('wall_kinetic', balance%wall_kinetic, 'J/m', 'kinetic energy of these walls')
       end if
+      if (balance%has_traffic) then
+         call row%set('entered_energy', balance%exchanged(1), 'J/m', 'energy that bodies brought when they entered')
+         call row%set('departed_energy', balance%exchanged(2), 'J/m', 'energy that bodies took when they left')
+      end if
       call row%set('impulse_x', balance%impulse(1), 'N s/m', 'impulse of gravity and fixed bodies along x')
       call row%set('impulse_y', balance%impulse(2), 'N s/m', 'impulse of gravity and fixed bodies along y')
       if (with_angular) &

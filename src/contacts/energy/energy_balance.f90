@@ -29,22 +29,22 @@ module polydem_energy_balance
    use polydem_exact_sum, only: exact_sum_t
    use polydem_force_sums, only: force_sums_t, sum_energy
    use polydem_kinds, only: ip, lp, wp
-   use polydem_serializer, only: serializer_t
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: energy_balance_t, balance_t, start_energy_balance, begin_step, accumulate_bodies, &
-      accumulate_all, accumulate_walls, count_step, evaluate_balance, serialize_balance, serialize_contributions
+      accumulate_all, accumulate_walls, count_step, evaluate_balance, allocate_channels, totals
+   public :: n_totals, at_mass, at_torque, at_channels, at_walls
 
    !> Running sums of the energy and momentum balance, and its values at the start
    type :: energy_balance_t
       !> Energy scale of the residual: largest kinetic energy or work of a channel so far [J/m]
       real(wp) :: energy_scale = 0.0_wp
       !> Largest sums over bodies of absolute momenta [N s/m] and angular momenta [N s] so far
-      real(wp), private :: momentum_scale(2) = 0.0_wp
+      real(wp) :: momentum_scale(2) = 0.0_wp
       !> Whether bodies and contacts are those of the last accumulated step. In the middle of a step they are not, and
       !> the last rates have full weight
-      logical, private :: is_current = .false.
+      logical :: is_current = .false.
       !> Sums over steps of the powers of forces on each body, (n_channels, slot); not allocated without a balance [W/m]
       real(wp), allocatable :: power_sum(:, :)
       !> Sums over steps of the torque of gravity on each body about the origin, (slot) [N]
@@ -57,6 +57,13 @@ module polydem_energy_balance
       real(wp) :: start(4) = 0.0_wp
       !> Elastic energy of the contacts at the start, if they have one [J/m]
       real(wp) :: elastic_start = 0.0_wp
+      !> Totals of the bodies that have left, of which those from `at_torque` on are used; not allocated if the bodies
+      !> of the run are always the same (`polydem_changed_bodies`)
+      real(wp), allocatable :: departed(:)
+      !> Impulse of gravity on them, less what bodies that entered have not felt (2), and its scale [N s/m]
+      real(wp) :: carried(3) = 0.0_wp
+      !> Energy that bodies brought when they entered, and that others took when they left [J/m]
+      real(wp) :: exchanged(2) = 0.0_wp
    end type energy_balance_t
 
    !> Terms and residuals of the balance at one time
@@ -81,6 +88,10 @@ module polydem_energy_balance
       logical :: has_loads = .false.
       !> Work of the loads and of the damping of their walls, and their kinetic energy [J/m]
       real(wp) :: load_work = 0.0_wp, load_damping_work = 0.0_wp, wall_kinetic = 0.0_wp
+      !> Whether bodies enter or leave
+      logical :: has_traffic = .false.
+      !> Energy that bodies brought when they entered, and that others took when they left [J/m]
+      real(wp) :: exchanged(2) = 0.0_wp
       !> Impulse of gravity and fixed bodies, (2) [N s/m]
       real(wp) :: impulse(2) = 0.0_wp
       !> Angular impulse of gravity and fixed bodies about the origin [N s]
@@ -233,6 +244,12 @@ contains
       balance%potential = total(2)
       balance%momentum = total(3:4)
       balance%angular_momentum = total(5)
+      if (allocated(sums%departed)) then
+         balance%has_traffic = .true.
+         balance%exchanged = sums%exchanged
+         total(at_torque:at_torque + 1) = total(at_torque:at_torque + 1) + sums%departed(at_torque:at_torque + 1)
+         total(at_channels + 1:) = total(at_channels + 1:) + sums%departed(at_channels + 1:)
+      end if
       sums%momentum_scale = max(sums%momentum_scale, total(6:7))
       associate (works => dt*total(at_channels + 1:at_walls), on_walls => dt*total(at_walls + 1:), &
                  mass_time => dt*total(at_mass), torques => dt*total(at_torque:at_torque + 1))
@@ -243,46 +260,16 @@ contains
          balance%friction_work = works(3)
          balance%wall_work = on_walls(1)
          balance%impulse = on_walls(2:3) + mass_time*gravity
+         if (balance%has_traffic) balance%impulse = balance%impulse + sums%carried(1:2)
          balance%angular_impulse = on_walls(4) + torques(1)
-         call find_residuals(sums, on_walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), &
+         call find_residuals(sums, on_walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))) + sums%carried(3), &
                              on_walls(6) + torques(2), balance)
       end associate
    end subroutine evaluate_balance
 
-   !> Serialize the values of the whole run.
-   subroutine serialize_balance(sums, serializer)
-      !> Running sums
-      type(energy_balance_t), intent(inout) :: sums
-      class(serializer_t), intent(inout) :: serializer
-
-      call serializer%field('/run/energy_balance_start', sums%start, 'J/m, N s/m, N s', &
-                        'energy, momentum and angular momentum at the start')
-      call serializer%field('/run/energy_balance_steps', sums%steps, '1', 'number of accumulated steps')
-      call serializer%field('/run/elastic_start', sums%elastic_start, 'J/m', 'elastic energy at the start')
-      call serializer%field('/run/energy_scale', sums%energy_scale, 'J/m', 'largest kinetic energy or work so far')
-      call serializer%field('/run/momentum_scale', sums%momentum_scale, 'N s/m, N s', &
-                        'largest sums over bodies of absolute momenta and angular momenta so far')
-   end subroutine serialize_balance
-
-   !> Serialize the channels of the bodies. When reading, the bodies may differ from those before.
-   subroutine serialize_contributions(sums, n_bodies, serializer)
-      !> Running sums
-      type(energy_balance_t), intent(inout) :: sums
-      !> Number of bodies
-      integer(ip), intent(in) :: n_bodies
-      class(serializer_t), intent(inout) :: serializer
-
-      if (serializer%is_reading) sums%is_current = .false.
-      if (serializer%is_reading .or. .not. allocated(sums%power_sum)) call allocate_channels(sums, n_bodies)
-      call serializer%field('/bodies/power_sum', sums%power_sum, 'W/m', &
-                        'sums over steps of the powers of elastic, damping and tangential forces')
-      call serializer%field('/bodies/torque_sum', sums%torque, 'N', 'sum over steps of the torque of gravity')
-      call serializer%field('/bodies/wall_sum', sums%wall_sum, 'W/m, N/m, N/m, N, N/m, N', &
-                        'sums over steps for fixed bodies: power, force, torque, absolute forces and torques')
-   end subroutine serialize_contributions
-
    !> Make room for the channels of bodies and set them to zero.
    subroutine allocate_channels(sums, n)
+      !> Running sums
       type(energy_balance_t), intent(inout) :: sums
       !> Number of bodies
       integer(ip), intent(in) :: n
@@ -326,11 +313,16 @@ contains
 
    !> Totals over all bodies of the communicator
    function totals(sums, comm, gravity, bodies, forces, walls) result(total)
+      !> Running sums
       type(energy_balance_t), intent(in) :: sums
       class(communicator_t), intent(inout) :: comm
+      !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
+      !> Bodies; those that `free` lists count
       type(bodies_t), intent(in) :: bodies
+      !> Sums of the contact forces on each body
       type(force_sums_t), intent(in) :: forces
+      !> Contacts with fixed bodies
       type(wall_terms_t), intent(in) :: walls
       real(wp) :: total(n_totals)
       type(exact_sum_t), allocatable :: partial_sums(:, :)

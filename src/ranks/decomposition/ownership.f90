@@ -52,24 +52,32 @@ contains
    end subroutine find_owned_pairs
 
    !> Find the global order of columns over the bodies. Collective.
-   subroutine order_bodies(comm, bodies, blocks)
+   subroutine order_bodies(comm, bodies, blocks, slots)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       !> Destination of each row
       type(row_distribution_t), intent(inout) :: blocks
+      !> Slots of some bodies, ascending; absent: all bodies
+      integer(ip), intent(in), optional :: slots(:)
       integer(ip) :: s
 
-      call order_parts(comm, bodies, [(s, s=1_ip, bodies%n)], blocks)
+      if (present(slots)) then
+         call order_parts(comm, bodies, slots, blocks, slots)
+      else
+         call order_parts(comm, bodies, [(s, s=1_ip, bodies%n)], blocks)
+      end if
    end subroutine order_bodies
 
    !> Find the global order of columns over parts of bodies. Collective.
-   subroutine order_parts(comm, bodies, body, blocks)
+   subroutine order_parts(comm, bodies, body, blocks, rows)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body of each part, ascending; the parts of one body have the same order on all ranks
       integer(ip), intent(in) :: body(:)
       !> Destination of each row
       type(row_distribution_t), intent(inout) :: blocks
+      !> Index of each part in the local columns; absent: its position in this list
+      integer(ip), intent(in), optional :: rows(:)
       integer(lp), allocatable :: key(:)
       integer(ip), allocatable :: slot(:)
       integer(ip) :: k, n
@@ -82,25 +90,36 @@ contains
             n = n + 1_ip
             key(n) = pair_key(bodies%global_index(s), k)
             slot(n) = k
+            if (present(rows)) slot(n) = rows(k)
          end associate
       end do
       call blocks%lay_out(comm, bodies%n_all, key(:n), slot(:n))
    end subroutine order_parts
 
    !> Find the global order of columns over the vertices of bodies. Collective.
-   subroutine order_vertices(comm, bodies, blocks)
+   subroutine order_vertices(comm, bodies, blocks, slots)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       !> Destination of each row
       type(row_distribution_t), intent(inout) :: blocks
-      integer(ip), allocatable :: body(:)
+      !> Slots of the bodies whose vertices are ordered, ascending; absent: all bodies
+      integer(ip), intent(in), optional :: slots(:)
+      integer(ip), allocatable :: body(:), vertex(:)
+      logical, allocatable :: is_chosen(:)
       integer(ip) :: s
 
       allocate (body(bodies%pieces%vertex_start(bodies%n + 1_ip) - 1_ip))
       do s = 1_ip, bodies%n
          body(bodies%pieces%vertex_start(s):bodies%pieces%vertex_start(s + 1_ip) - 1_ip) = s
       end do
-      call order_parts(comm, bodies, body, blocks)
+      if (.not. present(slots)) then
+         call order_parts(comm, bodies, body, blocks)
+         return
+      end if
+      allocate (is_chosen(bodies%n), source=.false.)
+      is_chosen(slots) = .true.
+      vertex = pack([(s, s=1_ip, size(body, kind=ip))], is_chosen(body))
+      call order_parts(comm, bodies, body(vertex), blocks, vertex)
    end subroutine order_vertices
 
    !> Find the global order of columns over pairs of bodies, such as contacts. Pairs of two fixed bodies are not

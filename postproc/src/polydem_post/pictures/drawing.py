@@ -182,14 +182,25 @@ def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLoo
 
 
 class Bodies:
-    """Some bodies in axes, in a periodic cell with copies around it.
+    """The fixed or the free bodies in axes, in a periodic cell with copies around it.
 
     Their outlines are views of one array, so moving them costs little.
     """
 
-    def __init__(self, axis: Axes, frame: Frame, rows: np.ndarray, **style):
+    def __init__(self, axis: Axes, frame: Frame, are_fixed: bool, **style):
+        self._are_fixed = are_fixed
+        paths = self._outline(frame)
+        self.artist = PathCollection(paths, **style)
+        axis.add_collection(self.artist, autolim=False)
+        copies = [PathCollection(paths, **style) for _ in frame.shifts]
+        _add_copies(axis, frame, copies)
+        self.artists = [self.artist, *copies]
+
+    def _outline(self, frame: Frame) -> list[Path]:
+        """The outlines of the bodies of a frame."""
         start = frame.vertex_start
-        self.rows = np.flatnonzero(rows)
+        self._present = frame.id
+        self.rows = np.flatnonzero(frame.fixed == self._are_fixed)
         count = np.diff(start)[self.rows]
         ends = np.cumsum(count + 1)
         begins = ends - count - 1
@@ -197,12 +208,7 @@ class Bodies:
         self._chosen = np.repeat(start[self.rows] - begins, count + 1) + np.arange(ends[-1] if len(ends) else 0)
         self._chosen[ends - 1] = start[self.rows]
         self._vertices = frame.vertex[self._chosen]
-        paths = [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
-        self.artist = PathCollection(paths, **style)
-        axis.add_collection(self.artist, autolim=False)
-        copies = [PathCollection(paths, **style) for _ in frame.shifts]
-        _add_copies(axis, frame, copies)
-        self.artists = [self.artist, *copies]
+        return [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
 
     def set(self, **properties: Any) -> None:
         """Set properties of the artist and of its copies."""
@@ -210,8 +216,13 @@ class Bodies:
             artist.set(**properties)
 
     def move(self, frame: Frame, look: SettledLook) -> None:
-        """Move them to where they are in another frame."""
-        self._vertices[:] = frame.vertex[self._chosen]
+        """Move them to where they are in another frame, which may have other bodies."""
+        if np.array_equal(frame.id, self._present):
+            self._vertices[:] = frame.vertex[self._chosen]
+        else:
+            paths = self._outline(frame)
+            for artist in self.artists:
+                artist.set_paths(paths)
         if look.quantity and self.artist.get_array() is not None:
             self.set(array=look.quantity.values(frame)[self.rows])
 
@@ -225,9 +236,8 @@ def _add_copies(axis: Axes, frame: Frame, copies: list[PathCollection]) -> None:
 
 def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bodies]:
     """Draw the fixed and the free bodies."""
-    fixed = frame.fixed
-    walls = Bodies(axis, frame, fixed, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
-    grains = Bodies(axis, frame, ~fixed, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
+    walls = Bodies(axis, frame, True, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
+    grains = Bodies(axis, frame, False, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
     if look.quantity:
         grains.set(array=look.quantity.values(frame)[grains.rows], cmap=look.colour_map(look.quantity),
                           norm=Normalize(*look.colour_range))

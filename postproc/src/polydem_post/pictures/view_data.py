@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import tempfile
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -130,6 +130,49 @@ class _Contacts:
         return len(pairs)
 
 
+class _Everybody:
+    """All bodies that some frames have: those that a frame lacks lie far outside, since the viewer has one list."""
+
+    def __init__(self, frames: Trajectory):
+        outlines: dict[int, tuple] = {}
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        before, lists = None, 0
+        self._bodies: dict | None = None
+        for frame in frames:
+            if before is not None and np.array_equal(before, frame.id):
+                continue
+            before, lists = frame.id, lists + 1
+            low, high = np.minimum(low, frame.vertex.min(axis=0)), np.maximum(high, frame.vertex.max(axis=0))
+            for k in np.flatnonzero(~np.isin(frame.id, list(outlines))):
+                part = slice(frame.vertex_start[k], frame.vertex_start[k + 1])
+                outlines[int(frame.id[k])] = (frame.fixed[k], frame.mass[k], frame.inertia[k], frame.material[k],
+                                              frame.shape[part])
+        if lists <= 1:
+            return
+        ids = np.array(sorted(outlines))
+        names = ("fixed", "mass", "inertia", "material")
+        self._bodies = {name: np.array([outlines[key][k] for key in ids]) for k, name in enumerate(names)}
+        shapes = [outlines[key][4] for key in ids]
+        self._bodies |= {"id": ids, "shape": np.concatenate(shapes),
+                         "vertex_start": np.concatenate([[0], np.cumsum([len(shape) for shape in shapes])])}
+        self._far = low - 4.0 * (high - low)
+
+    def with_absent(self, frame: Frame) -> tuple[Frame, np.ndarray | None]:
+        """A frame with all bodies, and which of them it lacks; None if all frames have all of them."""
+        if self._bodies is None:
+            return frame, None
+        present = np.isin(self._bodies["id"], frame.id)
+        columns = {}
+        for name in ("position", "angle", "velocity", "angular_velocity", "image", "slid"):
+            values = getattr(frame, name)
+            if values is None:
+                continue
+            columns[name] = np.zeros((len(present), *values.shape[1:]), dtype=values.dtype)
+            columns[name][present] = values
+        columns["position"][~present] = self._far
+        return replace(frame, **self._bodies, **columns), ~present
+
+
 def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, progress=None) -> Packed:
     """Read frames and pack them."""
     contacts = contacts and trajectory.has_contacts
@@ -137,7 +180,9 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     columns = {name: _Rows(np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")}
     values = {name: _Rows(np.float32) for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
     table, first, low, high = _Contacts(), None, np.full(2, np.inf), np.full(2, -np.inf)
-    for frame in trajectory[numbers]:
+    everybody = _Everybody(trajectory[numbers])
+    for present in trajectory[numbers]:
+        frame, absent = everybody.with_absent(present)
         if first is None:
             first = frame
             _pack_bodies(packed, frame)
@@ -145,8 +190,11 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
             columns[name].add(column)
         for name, collected in values.items():
             if not (QUANTITIES[name].constant and collected.count):
-                collected.add(QUANTITIES[name].values(frame)[~frame.fixed])
-        low, high = np.minimum(low, frame.vertex.min(axis=0)), np.maximum(high, frame.vertex.max(axis=0))
+                found = QUANTITIES[name].values(frame)
+                if absent is not None and not QUANTITIES[name].constant:
+                    found = np.where(absent, np.nan, found)
+                collected.add(found[~frame.fixed])
+        low, high = np.minimum(low, present.vertex.min(axis=0)), np.maximum(high, present.vertex.max(axis=0))
         if contacts:
             table.add(frame)
         if progress:

@@ -111,18 +111,58 @@ def read_segment(path: Path) -> Segment:
         return segment
 
 
+class FrameRows:
+    """Where the bodies of the frames of an open segment are: the one place that knows both forms of a segment.
+
+    Usually each column of /frames has one row per frame. If bodies enter or leave, it has one row per body of each
+    frame, and `id` says which body of /bodies that is.
+    """
+
+    def __init__(self, file: h5py.File):
+        self._frames = file["frames"]
+        self.is_ragged = "start" in self._frames
+
+    def column(self, name: str, row: int) -> np.ndarray:
+        """A column of a frame by its row in the segment."""
+        return self._frames[name][self._rows(row)]
+
+    def kept(self, row: int, identifiers: np.ndarray) -> np.ndarray | None:
+        """Which of the bodies of a segment a frame has; None: all of them."""
+        if not self.is_ragged:
+            return None
+        present = self._frames["id"][self._rows(row)]
+        kept = np.isin(identifiers, present)
+        if np.count_nonzero(kept) != len(present):
+            raise ResultError(f"{self._frames.file.filename}: frames/id names bodies that bodies/id does not have")
+        return kept
+
+    def _rows(self, row: int) -> slice | int:
+        if not self.is_ragged:
+            return row
+        low, high = (int(each) for each in self._frames["start"][row : row + 2])
+        return slice(low, high)
+
+
+#: Columns of /frames with one row per frame in any segment
+ROWS_OF_FRAMES = ("step", "time", "shift")
+
+
 def _complete_frames(file: h5py.File) -> int:
     """Number of frames that are there in all data sets and whose last one can be read.
 
     A program that dies while it writes a frame may leave some data sets one row longer than others.
     """
-    growing = [values for group in (file["frames"], balance_of(file)) for _, values in entries_of(group)]
+    frames = dict(entries_of(file["frames"]))
+    listed = [name for name in ("frames", "contacts") if name in file and "start" in file[name]]
+    if "frames" in listed:
+        frames = {name: values for name, values in frames.items() if name in ROWS_OF_FRAMES}
+    growing = [*frames.values(), *(values for _, values in entries_of(balance_of(file)))]
     if "walls" in file:
         growing += [values for name, values in entries_of(file["walls"]) if name != "id"]
     n = min(len(values) for values in growing)
-    if "contacts" in file:
-        start = file["contacts/start"][:]
-        rows = min(len(values) for name, values in entries_of(file["contacts"]) if name != "start")
+    for name in listed:
+        start = file[f"{name}/start"][:]
+        rows = min(len(values) for key, values in entries_of(file[name]) if key not in ("start", *ROWS_OF_FRAMES))
         n = min(n, int(np.searchsorted(start, rows, side="right")) - 1)
     while n > 0:
         try:

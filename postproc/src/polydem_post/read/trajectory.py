@@ -25,7 +25,7 @@ from ..base.result_file import (
 from .contacts import Contacts, Walls
 from .frames import CONTACT_FIELDS, Frame, find_contacts, sound_frame
 from .result_folder import ResultFolder
-from .segments import Segment
+from .segments import FrameRows, Segment
 from .settings import Settings
 from .tables import trajectory_dataset, trajectory_table
 
@@ -240,6 +240,33 @@ class Trajectory:
         return {name: np.concatenate(parts) for name, parts in columns.items()}
 
     @cached_property
+    def departures(self) -> dict[str, npt.NDArray[Any]]:
+        """Bodies that have left through a &sink, by name, each (rows); empty if there are none.
+
+        step        [1]     first step without the body
+        time        [s]     time of this step
+        sink        [1]     number of the sink among the groups &sink, from 1
+        id          [1]     identifier of the body
+        mass        [kg/m]  its mass
+        velocity_x, velocity_y  [m/s]  its velocity when it left
+        x, y        [m]     place of its centre of mass then
+        """
+        columns: dict[str, list[npt.NDArray[Any]]] = {}
+        for segment in self._files.segments:
+            with self._files.open_segment(segment) as file:
+                if "departures" not in file or not len(segment.steps):
+                    continue
+                parts = {name: values[:] for name, values in entries_of(file["departures"])}
+                n = min(map(len, parts.values()))
+                n = int(np.searchsorted(parts["step"][:n], segment.steps[-1], side="right"))
+                insist(segment.path, "departures", {name: part[:n] for name, part in parts.items()},
+                       dict.fromkeys(parts, (n,)))
+                for name, part in parts.items():
+                    whole = name in ("sink", "id")
+                    columns.setdefault(name, []).append(part[:n].astype(np.int64) if whole else part[:n])
+        return {name: np.concatenate(parts) for name, parts in columns.items()}
+
+    @cached_property
     def time_series_units(self) -> dict[str, str]:
         """Unit of each column of `time_series` by name."""
         units: dict[str, str] = {}
@@ -333,11 +360,16 @@ class Trajectory:
 
     def _frame_in(self, file: h5py.File, segment: Segment, row: int, number: int) -> Frame:
         frames = file["frames"]
-        if self._bodies[0] != segment.path:
+        rows = FrameRows(file)
+        # A run that goes on appends bodies to its open segment.
+        if self._bodies[0] != segment.path or (rows.is_ragged and len(file["bodies/id"]) != len(self._bodies[1]["id"])):
             self._bodies = (segment.path, _bodies_in(file))
         bodies = self._bodies[1]
+        kept = rows.kept(row, bodies["id"])
+        if kept is not None:
+            bodies = _chosen(kept, bodies)
         crossed = [name for name in ("image", "slid") if name in frames]
-        columns = {name: frames[name][row] for name in (*GROWING, *crossed)}
+        columns = {name: rows.column(name, row) for name in (*GROWING, *crossed)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
         if self._shift is not None:
             columns["position"] = columns["position"] + self._shift
@@ -387,7 +419,8 @@ class Trajectory:
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         """Which bodies the stored namelist moves, (n): all fixed ones, or those that a motion lists."""
         scene = self.settings.scene
-        walls = _wall_bodies(self.settings, self._bodies[1].get("id", frame.id))
+        bodies = {"id": frame.id, "fixed": frame.fixed, **self._bodies[1]}
+        walls = _wall_bodies(self.settings, bodies["id"][bodies["fixed"]])
         chosen = [walls[motion["wall"]] if motion.get("wall") else motion.get("bodies")
                   for motion in self.settings.get("motion", {}).values()]
         chosen += [walls[load["wall"]] for load in self.settings.get("load", {}).values()]
@@ -403,7 +436,7 @@ class Trajectory:
 
 
 def _wall_bodies(settings: Settings, ids: npt.NDArray[Any]) -> dict[str, Any]:
-    """Identifiers of the bodies of each group &wall: the last bodies of the run, wall after wall, or those it lists."""
+    """Identifiers of the bodies of each group &wall: the last fixed ones, wall after wall, or those it lists."""
     counts = {}
     for name, wall in settings.get("wall", {}).items():
         corners = np.size(wall.get("vertices", [])) // 2
@@ -421,11 +454,17 @@ def _without(gone: Any, columns: dict[str, Any], bodies: dict[str, Any]) -> tupl
     kept = ~np.isin(bodies["id"], gone)
     if kept.all():
         return columns, bodies
+    return {name: values[kept] for name, values in columns.items()}, _chosen(kept, bodies)
+
+
+def _chosen(kept: npt.NDArray[np.bool_], bodies: dict[str, Any]) -> dict[str, Any]:
+    """Columns of some bodies."""
     corners = np.diff(bodies["vertex_start"])
     start = np.concatenate([[0], np.cumsum(corners[kept])]).astype(bodies["vertex_start"].dtype)
     shape = bodies["shape"][np.repeat(kept, corners)]
-    rows = {name: values[kept] for name, values in bodies.items() if name not in ("shape", "vertex_start")}
-    return {name: values[kept] for name, values in columns.items()}, {**rows, "shape": shape, "vertex_start": start}
+    rows = {name: values if name.startswith("cell_") else values[kept]
+            for name, values in bodies.items() if name not in ("shape", "vertex_start")}
+    return {**rows, "shape": shape, "vertex_start": start}
 
 
 def _bodies_in(file: h5py.File) -> dict[str, Any]:

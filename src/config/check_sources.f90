@@ -1,0 +1,70 @@
+!> Checks of the groups &source and &sink: entries that depend on each other.
+module polydem_check_sources
+   use polydem_blame_entry, only: blame
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_group_instances, only: index_of_instance, instance_t, row_of
+   use polydem_kinds, only: wp
+   use polydem_settings, only: settings_t, source_settings_t
+   implicit none
+   private
+   public :: check_sources
+
+contains
+
+   !> Check sources and sinks.
+   pure subroutine check_sources(settings, instances, error)
+      !> Settings with all entries filled in
+      type(settings_t), intent(in) :: settings
+      !> All groups with their values, which contain the places for messages
+      type(instance_t), intent(in) :: instances(:)
+      !> First contradiction
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), parameter :: corner = 'must exceed ''low'' along x and y'
+      integer :: k
+
+      do k = 1, size(settings%source)
+         associate (source => settings%source(k), &
+                    instance => instances(index_of_instance(instances, 'source', settings%source(k)%name)))
+            if (.not. all(source%low < source%high)) call blame(instance, 'high', corner, error, 'low')
+            if (source%rate > 0.0_wp .and. source%count > 0) call blame(instance, 'rate', &
+               'cannot be combined with ''count''; give only one of them', error, 'count')
+            if (.not. source%rate > 0.0_wp .and. source%count == 0) call blame(instance, 'rate', &
+               'is 0; give it, or give ''count'', for example count = 500', error)
+            call check_shape(source, instance, error)
+         end associate
+      end do
+      do k = 1, size(settings%sink)
+         associate (sink => settings%sink(k), &
+                    instance => instances(index_of_instance(instances, 'sink', settings%sink(k)%name)))
+            if (.not. all(sink%low < sink%high)) call blame(instance, 'high', corner, error, 'low')
+         end associate
+      end do
+      if (settings%output%trace_steps > 0 .and. size(settings%source) + size(settings%sink) > 0) then
+         associate (group => instances(index_of_instance(instances, 'output')))
+            call raise(error, input_error, group%values(row_of(group, 'trace_steps'))%place// &
+               ': ''trace_steps'' in &output cannot be combined with &source or &sink, because a trace has '// &
+               'the same boxes in all steps')
+         end associate
+      end if
+   end subroutine check_sources
+
+   !> Check the shape of the bodies of a source, as `check_parts` checks that of grains.
+   pure subroutine check_shape(source, instance, error)
+      type(source_settings_t), intent(in) :: source
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), parameter :: order = 'must be in ascending order: the smallest before the largest one'
+
+      if (source%corners(1) > source%corners(2)) call blame(instance, 'corners', order, error)
+      if (source%long_axis(1) > source%long_axis(2)) call blame(instance, 'long_axis', order, error)
+      if (source%diameter(1) > source%diameter(2)) call blame(instance, 'diameter', order, error)
+      if (source%angle(1) > source%angle(2)) call blame(instance, 'angle', order, error)
+      if (source%shape == 'ellipse' .and. source%short_axis > source%long_axis(1)) call blame(instance, 'short_axis', &
+         'must not exceed the first value of ''long_axis''', error, 'long_axis')
+      if (source%shape == 'ellipse' .and. source%long_axis(2) > 1.0e6_wp*source%short_axis) call blame(instance, &
+         'long_axis', 'must not exceed 1e6 times ''short_axis''', error, 'short_axis')
+      if (max(source%width, source%height) > 1.0e6_wp*min(source%width, source%height)) call blame(instance, 'width', &
+         'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
+   end subroutine check_shape
+
+end module polydem_check_sources

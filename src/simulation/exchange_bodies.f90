@@ -1,0 +1,391 @@
+!> Sources and sinks: bodies that enter and leave between two steps.
+!>
+!> This is the first part of a step, so no checkpoint lies between it and the search for pairs that restores the contact
+!> history. Bodies leave first. All ranks draw the same candidates; each marks those that would meet a body of its own,
+!> and those that are left are compared with each other in the order in which they were drawn. All ranks decide alike.
+!>
+!> Bodies are compared by circles around them, fixed ones by their outlines.
+module polydem_exchange_bodies
+   use polydem_bodies, only: bodies_t
+   use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_cell, only: nearest_copy
+   use polydem_changed_bodies, only: count_entering, find_leaving_totals, n_totals, take_leaving
+   use polydem_elementary, only: hypotenuse
+   use polydem_errors, only: error_t
+   use polydem_exact_all_reduce, only: all_reduce_exact_sums
+   use polydem_exact_sum, only: exact_sum_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_ownership, only: owns_pair
+   use polydem_replace_bodies, only: replace_bodies
+   use polydem_simulation, only: simulation_t
+   use polydem_sort, only: ascending_order, place_in
+   use polydem_source, only: candidate_t, source_t
+   use polydem_traffic, only: departure_t, is_due, number_of_values
+   use polydem_wall_energy, only: release_energy
+   implicit none
+   private
+   public :: exchange_bodies, find_leaving, meets_fixed
+
+contains
+
+   !> Let bodies leave and enter before a step, if it is time. Collective; all ranks get the same error.
+   subroutine exchange_bodies(self, error)
+      !> The simulation between two steps
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if there are no identifiers left
+      type(error_t), allocatable, intent(inout) :: error
+      type(departure_t) :: departing
+      type(body_list_t) :: list
+      type(bodies_t) :: added
+      logical, allocatable :: kept(:)
+      integer, allocatable :: origin(:)
+
+      if (.not. self%traffic%has_event(self%step)) return
+      call find_leaving(self)
+      call list_departures(self, departing, kept)
+      list%rank = self%comm%rank
+      list%n_ranks = self%comm%size
+      list%has_materials = size(self%settings%material) > 0
+      call list_entries(self, size(departing%id, kind=lp), kept, list, origin)
+      if (size(departing%id) > 0) then
+         if (self%settings%output%energy_balance) then
+            call take_leaving(self%energy_balance, self%dt, self%settings%forces%gravity, &
+                              self%traffic%leaving(:n_totals))
+            call release_energy(self%energy_balance, self%traffic%leaving(n_totals + 1))
+         end if
+         call self%traffic%keep_departures(self%step + 1_lp, real(self%step + 1_lp, dp)*real(self%dt, dp), departing)
+      end if
+      if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
+      if (size(departing%id) == 0 .and. list%n == 0_ip) return
+      call new_bodies(list, added, error)
+      call self%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      call count_masses(self, added, origin)
+      if (self%settings%output%energy_balance) call count_entering(self%energy_balance, self%comm, self%dt, &
+         self%settings%forces%gravity, added)
+      call replace_bodies(self, kept, added, error)
+   end subroutine exchange_bodies
+
+   !> Count the masses of bodies that enter, in the order of their identifiers. Collective.
+   subroutine count_masses(self, added, origin)
+      type(simulation_t), intent(inout) :: self
+      !> Bodies of this rank that enter
+      type(bodies_t), intent(in) :: added
+      !> Number of the source of each one of all ranks
+      integer, intent(in) :: origin(:)
+      integer(lp), allocatable :: index(:)
+      real(dp), allocatable :: mass(:)
+      integer(ip), allocatable :: counts(:), order(:)
+      integer :: k
+
+      call self%comm%gather(int(added%global_index, lp), index, counts)
+      call self%comm%gather(real(added%mass, dp), mass, counts)
+      order = ascending_order(index)
+      do k = 1, size(order)
+         associate (source => self%traffic%sources(origin(k)))
+            source%mass = source%mass + real(mass(order(k)), wp)
+         end associate
+      end do
+   end subroutine count_masses
+
+   !> Find what the balance must know of the bodies that leave before the next step, unless a restart has read it: their
+   !> totals, and the elastic energy of their contacts. Collective.
+   subroutine find_leaving(self)
+      !> The simulation between two steps; `leaving` of its traffic is set
+      type(simulation_t), intent(inout) :: self
+      type(departure_t) :: departing
+      type(exact_sum_t) :: released(1)
+      logical, allocatable :: kept(:)
+      real(wp) :: total(n_totals)
+      integer(ip) :: c
+
+      if (.not. allocated(self%traffic)) return
+      if (self%walk%step /= self%step .or. .not. self%settings%output%energy_balance) return
+      if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
+      call list_departures(self, departing, kept)
+      if (size(departing%id) == 0) return
+      call find_leaving_totals(self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, &
+                               self%force_sums, self%walk%walls, .not. kept, total)
+      associate (contacts => self%contacts, bodies => self%bodies)
+         if (self%walk%walls%energy_is_known) then
+            do c = 1_ip, contacts%n
+               if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+               if (stays(contacts%first(c)) .and. stays(contacts%second(c))) cycle
+               call released(1)%add(0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c))
+               if (contacts%has_cohesion) &
+                  call released(1)%add(contacts%cohesion(c)*contacts%area(c)/contacts%length(c))
+            end do
+         end if
+      end associate
+      call all_reduce_exact_sums(self%comm, released)
+      self%traffic%leaving = [total, released%value()]
+
+   contains
+
+      !> Whether a body stays, also one of another rank
+      pure logical function stays(s)
+         integer(ip), intent(in) :: s
+         integer :: k
+
+         k = int(place_in(int(departing%id, ip), self%bodies%id(s)))
+         stays = .true.
+         if (k <= size(departing%id)) stays = departing%id(k) /= int(self%bodies%id(s), lp)
+      end function stays
+
+   end subroutine find_leaving
+
+   !> List the bodies that leave before the next step. Collective.
+   subroutine list_departures(self, departing, kept)
+      type(simulation_t), intent(inout) :: self
+      !> These bodies of all ranks
+      type(departure_t), intent(out) :: departing
+      !> Whether each body of this rank stays, (slot)
+      logical, allocatable, intent(out) :: kept(:)
+      integer(lp), allocatable :: mine(:), all_of_them(:)
+      real(dp), allocatable :: values(:), all_values(:)
+      integer(ip), allocatable :: counts(:), order(:)
+      integer(ip) :: k, w
+
+      allocate (kept(self%bodies%n), source=.true.)
+      allocate (departing%id(0), departing%sink(0), departing%value(number_of_values, 0))
+      if (.not. self%traffic%has_departures(self%step)) return
+      allocate (mine(0), values(0))
+      do k = 1_ip, size(self%bodies%free, kind=ip)
+         associate (s => self%bodies%free(k), bodies => self%bodies)
+            w = sink_of(bodies%position(:, s))
+            if (w == 0_ip) cycle
+            kept(s) = .false.
+            mine = [mine, int(bodies%id(s), lp), int(w, lp)]
+            values = [values, real([bodies%mass(s), bodies%velocity(:, s), bodies%position(:, s)], dp)]
+         end associate
+      end do
+      call self%comm%gather(mine, all_of_them, counts)
+      call self%comm%gather(values, all_values, counts)
+      order = ascending_order(all_of_them(1::2))
+      departing%id = all_of_them(2*order - 1)
+      departing%sink = all_of_them(2*order)
+      deallocate (departing%value)
+      allocate (departing%value(number_of_values, size(order)))
+      do k = 1_ip, size(order, kind=ip)
+         departing%value(:, k) = all_values((order(k) - 1)*number_of_values + 1:order(k)*number_of_values)
+      end do
+
+   contains
+
+      !> Number of the first sink in which a point is; 0: none
+      pure integer(ip) function sink_of(point)
+         real(wp), intent(in) :: point(2)
+         integer(ip) :: j
+
+         do j = 1_ip, size(self%traffic%sinks, kind=ip)
+            associate (sink => self%traffic%sinks(j))
+               if (all(point >= sink%settings%low) .and. all(point < sink%settings%high)) then
+                  if (is_due(sink%settings%interval, sink%stage, self%step, self%stages%number)) then
+                     sink_of = j
+                     return
+                  end if
+               end if
+            end associate
+         end do
+         sink_of = 0_ip
+      end function sink_of
+
+   end subroutine list_departures
+
+   !> List the bodies that enter before the next step. Collective.
+   subroutine list_entries(self, n_leaving, kept, list, origin)
+      type(simulation_t), intent(inout) :: self
+      !> Number of bodies that leave
+      integer(lp), intent(in) :: n_leaving
+      !> Whether each body stays
+      logical, intent(in) :: kept(:)
+      !> Bodies that enter
+      type(body_list_t), intent(inout) :: list
+      !> Number of the source of each of them
+      integer, allocatable, intent(out) :: origin(:)
+      type(candidate_t), allocatable :: candidates(:)
+      integer(lp), allocatable :: is_blocked(:)
+      real(wp), allocatable :: circles(:, :)
+      integer(lp) :: n_free
+      real(wp) :: elapsed
+      integer :: k, n_entered
+
+      allocate (circles(3, 0), origin(0))
+      do k = 1, size(self%traffic%sources)
+         associate (source => self%traffic%sources(k))
+            if (.not. is_due(source%settings%interval, source%stage, self%step, self%stages%number)) cycle
+            n_free = int(self%bodies%n_all - count(self%bodies%fixed, kind=ip) + list%n, lp) - n_leaving
+            elapsed = real(self%step, wp)*self%dt
+            if (source%stage > 0_ip) elapsed = real(self%step - self%stages%first(source%stage), wp)*self%dt
+            if (source%wanted(n_free, elapsed) == 0_lp) cycle
+            call source%draw_candidates(source%wanted(n_free, elapsed), candidates)
+            call mark_blocked(self, source, candidates, kept, is_blocked)
+            call self%comm%all_reduce_max(is_blocked)
+            call admit(self, source, candidates, is_blocked, circles, list, n_entered)
+            origin = [origin, spread(k, 1, n_entered)]
+            if (n_entered < size(candidates)) source%blocked = source%blocked + 1_lp
+         end associate
+      end do
+   end subroutine list_entries
+
+   !> Mark the places at which a candidate would meet a body of this rank.
+   subroutine mark_blocked(self, source, candidates, kept, is_blocked)
+      type(simulation_t), intent(in) :: self
+      type(source_t), intent(in) :: source
+      type(candidate_t), intent(in) :: candidates(:)
+      logical, intent(in) :: kept(:)
+      !> 1: it would, (place of the first candidate, ..., place of the last one)
+      integer(lp), allocatable, intent(out) :: is_blocked(:)
+      real(wp), allocatable :: near(:, :)
+      real(wp) :: middle(2), reach, place(2)
+      integer :: j, k, n
+
+      middle = 0.5_wp*(source%settings%low + source%settings%high)
+      reach = hypotenuse(source%settings%high(1) - middle(1), source%settings%high(2) - middle(2)) &
+         + 2.0_wp*maxval(candidates%radius)
+      call list_near(self%bodies, middle, reach, kept, near)
+      allocate (is_blocked(size(candidates)*size(candidates(1)%place, 2)), source=0_lp)
+      n = 0
+      do k = 1, size(candidates)
+         do j = 1, size(candidates(k)%place, 2)
+            n = n + 1
+            place = candidates(k)%place(:, j)
+            if (meets_any(self%bodies, place, candidates(k)%radius, near) .or. &
+                meets_fixed(self%bodies, place, candidates(k)%radius)) is_blocked(n) = 1_lp
+         end do
+      end do
+   end subroutine mark_blocked
+
+   !> List the circles around the free bodies near a point: centre and radius, (3, body) [m].
+   subroutine list_near(bodies, point, reach, kept, near)
+      type(bodies_t), intent(in) :: bodies
+      !> The point, and the distance to the farthest circle [m]
+      real(wp), intent(in) :: point(2), reach
+      !> Whether each body stays
+      logical, intent(in) :: kept(:)
+      real(wp), allocatable, intent(out) :: near(:, :)
+      real(wp) :: offset(2)
+      integer(ip) :: k, n
+
+      allocate (near(3, size(bodies%free)))
+      n = 0_ip
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (s => bodies%free(k))
+            if (.not. kept(s)) cycle
+            offset = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, s) - point)
+            if (hypotenuse(offset(1), offset(2)) >= reach + bodies%radius(s)) cycle
+            n = n + 1_ip
+            near(:, n) = [bodies%position(:, s), bodies%radius(s)]
+         end associate
+      end do
+      near = near(:, :n)
+   end subroutine list_near
+
+   !> Whether a circle meets one of others
+   pure logical function meets_any(bodies, centre, radius, circles)
+      !> Bodies, of which the cell is used
+      type(bodies_t), intent(in) :: bodies
+      !> Centre and radius [m]
+      real(wp), intent(in) :: centre(2), radius
+      !> Centres and radii of the others, (3, circle) [m]
+      real(wp), intent(in) :: circles(:, :)
+      real(wp) :: offset(2)
+      integer :: k
+
+      meets_any = .true.
+      do k = 1, size(circles, 2)
+         offset = nearest_copy(bodies%cell, bodies%cell%inverse, circles(1:2, k) - centre)
+         if (sum(offset**2) < (radius + circles(3, k))**2) return
+      end do
+      meets_any = .false.
+   end function meets_any
+
+   !> Whether a circle meets a fixed body that is there
+   pure logical function meets_fixed(bodies, centre, radius)
+      !> Bodies with the turned vertices of the fixed ones
+      type(bodies_t), intent(in) :: bodies
+      !> Centre and radius [m]
+      real(wp), intent(in) :: centre(2), radius
+      real(wp) :: offset(2), folds(2)
+      integer(ip) :: s
+
+      meets_fixed = .true.
+      do s = 1_ip, bodies%n
+         if (.not. bodies%fixed(s)) cycle
+         if (allocated(bodies%gone)) then
+            if (bodies%gone(s)) cycle
+         end if
+         offset = centre - bodies%position(:, s)
+         folds = 0.0_wp
+         if (allocated(bodies%folds)) folds = bodies%folds(:, s)
+         offset = nearest_copy(bodies%cell, folds, offset)
+         if (hypotenuse(offset(1), offset(2)) >= radius + bodies%radius(s)) cycle
+         if (distance_from(bodies%pieces%turned_polygon(s), offset) < radius) return
+      end do
+      meets_fixed = .false.
+   end function meets_fixed
+
+   !> Greatest distance of a point from the lines of the edges of a convex polygon, outwards: at most its distance from
+   !> the polygon [m]
+   pure real(wp) function distance_from(polygon, point) result(distance)
+      !> Vertices, anticlockwise, (2, vertex) [m]
+      real(wp), intent(in) :: polygon(:, :)
+      !> The point [m]
+      real(wp), intent(in) :: point(2)
+      real(wp) :: edge(2), from(2)
+      integer :: k, n
+
+      distance = -huge(1.0_wp)
+      n = size(polygon, 2)
+      do k = 1, n
+         edge = polygon(:, mod(k, n) + 1) - polygon(:, k)
+         from = point - polygon(:, k)
+         distance = max(distance, (from(1)*edge(2) - from(2)*edge(1))/hypotenuse(edge(1), edge(2)))
+      end do
+   end function distance_from
+
+   !> Append the candidates that find room, in the order in which they were drawn, up to the first one that does not.
+   subroutine admit(self, source, candidates, is_blocked, circles, list, n_entered)
+      type(simulation_t), intent(in) :: self
+      type(source_t), intent(inout) :: source
+      type(candidate_t), intent(in) :: candidates(:)
+      integer(lp), intent(in) :: is_blocked(:)
+      !> Circles around the bodies that enter; those of these are appended
+      real(wp), allocatable, intent(inout) :: circles(:, :)
+      type(body_list_t), intent(inout) :: list
+      !> Number of bodies that enter
+      integer, intent(out) :: n_entered
+      integer :: j, k, n, n_places
+
+      n_places = size(candidates(1)%place, 2)
+      n_entered = 0
+      do k = 1, size(candidates)
+         n = 0
+         do j = 1, n_places
+            if (is_blocked((k - 1)*n_places + j) == 1_lp) cycle
+            if (meets_any(self%bodies, candidates(k)%place(:, j), candidates(k)%radius, circles)) cycle
+            n = j
+            exit
+         end do
+         if (n == 0) return
+         circles = reshape([circles, candidates(k)%place(:, n), candidates(k)%radius], [3, size(circles, 2) + 1])
+         call append_candidate(source, candidates(k), candidates(k)%place(:, n), list)
+         n_entered = n_entered + 1
+      end do
+   end subroutine admit
+
+   !> Append a body that enters.
+   subroutine append_candidate(source, candidate, place, list)
+      type(source_t), intent(inout) :: source
+      type(candidate_t), intent(in) :: candidate
+      !> Its place [m]
+      real(wp), intent(in) :: place(2)
+      type(body_list_t), intent(inout) :: list
+
+      call list%append(candidate%corners + spread(place, 2, size(candidate%corners, 2)), density=source%density, &
+                       velocity=source%settings%velocity, material=source%material)
+      source%entered = source%entered + 1_lp
+      source%shapes = candidate%after
+   end subroutine append_candidate
+
+end module polydem_exchange_bodies

@@ -1,0 +1,165 @@
+!> A source: free bodies that enter a rectangle during a run.
+!>
+!> The shapes of its bodies are one stream of random numbers, their places another one. The n-th body that enters has
+!> the n-th shape, wherever and whenever it finds room: a shape that finds none waits, and so do those behind it. Small
+!> grains are therefore not preferred. All ranks draw the same numbers.
+module polydem_source
+   use polydem_elementary, only: hypotenuse
+   use polydem_grains, only: draw_grains, grains_t
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_parts, only: new_grains
+   use polydem_random, only: new_random, random_t
+   use polydem_serializer, only: serializer_t
+   use polydem_settings, only: grains_settings_t, source_settings_t
+   implicit none
+   private
+   public :: source_t, candidate_t, new_source
+
+   !> Greatest number of bodies that enter at a time, and number of places that are tried for each of them
+   integer(lp), parameter :: most_at_once = 500_lp
+   integer, parameter :: n_tries = 20
+
+   !> A source
+   type :: source_t
+      !> Its group &source
+      type(source_settings_t) :: settings
+      !> Number of the stage in which bodies enter; 0: in all
+      integer(ip) :: stage = 0_ip
+      !> Number of the material
+      integer(ip) :: material = 0_ip
+      !> Density [kg/m3]
+      real(wp) :: density = 0.0_wp
+      !> Number of bodies that have entered, and of times at which one found no room
+      integer(lp) :: entered = 0_lp, blocked = 0_lp
+      !> Mass that has entered [kg/m]
+      real(wp) :: mass = 0.0_wp
+      !> Random numbers of shapes and of places
+      type(random_t) :: shapes, places
+   contains
+      procedure :: draw_shape
+      procedure :: draw_candidates
+      procedure :: wanted
+      procedure :: serialize
+   end type source_t
+
+   !> A body that may enter
+   type :: candidate_t
+      !> Corners relative to its place, (2, corner) [m]
+      real(wp), allocatable :: corners(:, :)
+      !> Greatest distance of a corner from its place [m]
+      real(wp) :: radius = 0.0_wp
+      !> Places to try, (2, place) [m]
+      real(wp) :: place(2, n_tries) = 0.0_wp
+      !> Random numbers of the shapes after this one
+      type(random_t) :: after
+   end type candidate_t
+
+contains
+
+   !> Start a source.
+   subroutine new_source(settings, seed, source)
+      type(source_settings_t), intent(in) :: settings
+      !> Seed of its random numbers
+      integer(ip), intent(in) :: seed
+      type(source_t), intent(out) :: source
+
+      source%settings = settings
+      source%shapes = new_random(seed)
+      source%places = new_random(ieor(seed, 65536_ip))
+   end subroutine new_source
+
+   !> Draw the shape of a body: the one place where sources make shapes.
+   subroutine draw_shape(self, random, candidate)
+      class(source_t), intent(in) :: self
+      !> Random numbers of shapes
+      type(random_t), intent(inout) :: random
+      !> Its corners and radius are set
+      type(candidate_t), intent(inout) :: candidate
+      type(grains_settings_t) :: group
+      type(grains_t) :: grains
+
+      associate (s => self%settings)
+         group = new_grains(s%name)
+         group%shape = s%shape
+         group%corners = s%corners
+         group%short_axis = s%short_axis
+         group%long_axis = s%long_axis
+         group%diameter = s%diameter
+         group%width = s%width
+         group%height = s%height
+         group%outline = s%outline
+         group%angle = s%angle
+         call draw_grains(group, random, 1_ip, grains)
+         candidate%corners = grains%polygon(1_ip)
+         ! As the sizes of &grains: the number density is proportional to size**-3.
+         if (s%size_ratio > 1.0_wp) candidate%corners = candidate%corners/ &
+            sqrt(1.0_wp - random%uniform()*(1.0_wp - s%size_ratio**(-2)))
+      end associate
+      candidate%radius = maxval(hypotenuse(candidate%corners(1, :), candidate%corners(2, :)))
+   end subroutine draw_shape
+
+   !> Draw the next bodies with places that have them within the rectangle. The random numbers of shapes stay as they
+   !> are.
+   subroutine draw_candidates(self, n, candidates)
+      class(source_t), intent(inout) :: self
+      !> Their number
+      integer(lp), intent(in) :: n
+      !> The bodies
+      type(candidate_t), allocatable, intent(out) :: candidates(:)
+      type(random_t) :: stream
+      real(wp) :: low(2), high(2)
+      integer :: j, k
+
+      allocate (candidates(n))
+      stream = self%shapes
+      do k = 1, size(candidates)
+         call self%draw_shape(stream, candidates(k))
+         candidates(k)%after = stream
+         low = self%settings%low + candidates(k)%radius
+         high = max(low, self%settings%high - candidates(k)%radius)
+         do j = 1, n_tries
+            candidates(k)%place(1, j) = self%places%between(low(1), high(1))
+            candidates(k)%place(2, j) = self%places%between(low(2), high(2))
+         end do
+      end do
+   end subroutine draw_candidates
+
+   !> Number of bodies that should enter
+   pure integer(lp) function wanted(self, n_free, elapsed)
+      class(source_t), intent(in) :: self
+      !> Number of free bodies of the run
+      integer(lp), intent(in) :: n_free
+      !> Time since bodies may enter [s]
+      real(wp), intent(in) :: elapsed
+
+      if (self%settings%count > 0_ip) then
+         wanted = int(self%settings%count, lp) - n_free
+      else
+         wanted = int(min(self%settings%rate*elapsed, 1.0e15_wp), lp) - self%entered
+      end if
+      wanted = max(0_lp, min(wanted, most_at_once))
+   end function wanted
+
+   !> Serialize what changes.
+   subroutine serialize(self, serializer)
+      class(source_t), intent(inout) :: self
+      class(serializer_t), intent(inout) :: serializer
+      integer(lp) :: counts(2), shapes(6), places(6)
+
+      counts = [self%entered, self%blocked]
+      shapes = self%shapes%state()
+      places = self%places%state()
+      associate (name => '/run/source_'//self%settings%name)
+         call serializer%field(name//'_counts', counts, '1', 'bodies that have entered, times without room')
+         call serializer%field(name//'_mass', self%mass, 'kg/m', 'mass that has entered')
+         call serializer%field(name//'_shapes', shapes, '1', 'state of the random numbers of shapes')
+         call serializer%field(name//'_places', places, '1', 'state of the random numbers of places')
+      end associate
+      if (.not. serializer%is_reading .or. allocated(serializer%error)) return
+      self%entered = counts(1)
+      self%blocked = counts(2)
+      call self%shapes%set_state(shapes)
+      call self%places%set_state(places)
+   end subroutine serialize
+
+end module polydem_source
