@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from polydem_post import Trajectory
+from polydem_post.analysis import coarse_grain, lucy, solid_fraction, stress_tensor
+from polydem_post.base.result_file import ResultError
 from polydem_post.pictures.drawing import Look, draw_bodies, overlays, settle
 from polydem_post.pictures.movie import make_movie
 
@@ -83,3 +85,55 @@ def test_paths_and_arms_in_a_sheared_cell(tmp_path):
         contacts = frame.contacts
         for index, arm in ((contacts.first_index, contacts.first_arm), (contacts.second_index, contacts.second_arm)):
             assert np.all(np.hypot(*arm.T) <= frame.radius[index] + 1e-12)
+
+
+def windows_of(frame):
+    """The cell, its left half and its right half."""
+    (x, y), (width, height) = frame.cell_low, frame.cell_size
+    return ((x, y, x + width, y + height), (x, y, x + width / 2, y + height),
+            (x + width / 2, y, x + width, y + height))
+
+
+def test_the_stress_of_the_cell_is_that_of_its_contacts(trajectory):
+    tried = 0
+    for frame in trajectory:
+        whole, left, right = windows_of(frame)
+        area = frame.cell_size.prod()
+        stress = stress_tensor(frame, whole)
+        contacts = frame.contacts
+        expected = np.einsum("ci,cj->ij", contacts.force, contacts.branch) / area
+        assert stress.contact == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        halves = [stress_tensor(frame, window) for window in (left, right)]
+        assert 0.5 * (halves[0].contact + halves[1].contact) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        relative = frame.velocity - frame.mass @ frame.velocity / frame.mass.sum()
+        kinetic = np.einsum("b,bi,bj->ij", frame.mass, relative, relative) / area
+        assert stress.kinetic == pytest.approx(kinetic, rel=1e-9)
+        tried += len(contacts.force)
+    assert tried > 50
+
+
+def test_a_window_does_not_notice_where_the_border_is(trajectory):
+    frame = trajectory[30]
+    (x, y), (width, height) = frame.cell_low, frame.cell_size
+    inside = stress_tensor(frame, (x + 0.2 * width, y, x + width, y + height))
+    over = stress_tensor(frame, (x + 0.2 * width - width, y, x, y + height))
+    assert inside.contact == pytest.approx(over.contact, abs=1e-9)
+    with pytest.raises(ResultError, match="further out of the periodic cell"):
+        stress_tensor(frame, (x, y, x + 2.5 * width, y + height))
+
+
+def test_the_solid_fraction_of_the_cell_is_that_of_its_grains(trajectory):
+    for frame in (trajectory[0], trajectory[30]):
+        whole, left, right = windows_of(frame)
+        expected = frame.area.sum() / frame.cell_size.prod()
+        assert solid_fraction(frame, whole) == pytest.approx(expected, rel=1e-12)
+        assert solid_fraction(frame, left) + solid_fraction(frame, right) == pytest.approx(2 * expected, rel=1e-12)
+
+
+def test_fields_cover_the_cell_and_know_its_copies(trajectory):
+    frame = trajectory[30]
+    fields = coarse_grain(frame, lucy(0.01), 0.001)
+    assert fields.density.shape == (50, 60)
+    assert fields.density.sum() * fields.cell == pytest.approx(frame.mass.sum(), rel=1e-9)
+    expected = np.einsum("ci,cj->ij", frame.contacts.force, frame.contacts.branch)
+    assert fields.contact_stress.sum(axis=(0, 1)) * fields.cell == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -11,6 +11,7 @@ from ..base.polygons import FloatArray, IntArray
 from ..base.result_file import ResultError
 from ..read.frames import Frame
 from .stress import branches
+from .windows import rectangle, shifts_into
 
 #: Points of a branch vector on which its stress is spread, per distance of grid points, and the least number
 LINE_POINTS, LEAST_LINE_POINTS = 2.0, 8
@@ -107,6 +108,9 @@ def coarse_grain(frame: Frame, kernel: Kernel, spacing: float, *,
     the bodies. The grid covers all bodies and the range of the kernel unless a window (least x, least y, greatest x,
     greatest y) [m] is given; then what lies outside is lost, and nothing else. `contacts=False` leaves the contact
     stress out, for results without contacts.
+
+    In a periodic cell copies count as bodies do, and the grid covers the cell; in a sheared one it keeps the range of
+    the kernel away from the upper and lower border, behind which copies have other velocities.
     """
     if not spacing > 0.0 or kernel.range < spacing:
         raise ResultError("the spacing must be above 0, and at most the range of the kernel")
@@ -115,7 +119,7 @@ def coarse_grain(frame: Frame, kernel: Kernel, spacing: float, *,
     mass, velocity, place = frame.mass[free], frame.velocity[free], frame.position[free]
     second = velocity[:, :, None] * velocity[:, None, :]
     carried = np.concatenate([np.ones((len(mass), 1)), velocity, second.reshape(-1, 4)], axis=1) * mass[:, None]
-    spread = grid.spread(place, carried)
+    spread = grid.spread_copies(frame, place, carried)
     density, momentum = spread[..., 0], spread[..., 1:3]
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = momentum[..., :, None] * momentum[..., None, :] / density[..., None, None]
@@ -133,7 +137,7 @@ def _contact_stress(frame: Frame, grid: _Grid) -> FloatArray:
     pieces = max(LEAST_LINE_POINTS, int(np.ceil(LINE_POINTS * length / grid.spacing)))
     total = np.zeros((len(grid.y), len(grid.x), 4))
     for share in (np.arange(pieces) + 0.5) / pieces:
-        total += grid.spread(end + share * branch, carried / pieces)
+        total += grid.spread_copies(frame, end + share * branch, carried / pieces)
     return total.reshape(*total.shape[:2], 2, 2)
 
 
@@ -143,20 +147,35 @@ class _Grid:
     def __init__(self, frame: Frame, kernel: Kernel, spacing: float,
                  window: tuple[float, float, float, float] | None):
         self.kernel, self.spacing = kernel, spacing
+        # Copies above and below a sheared cell have other velocities.
+        inset = np.array([0.0, kernel.range if frame.slid is not None else 0.0])
+        inner_low, inner_high = frame.cell_low + inset, frame.cell_low + frame.cell_size - inset
         if window is None:
             bounds = frame.bounds[frame.free]
             if len(bounds) == 0:
                 raise ResultError("there are no free bodies")
             margin = kernel.range + spacing
             low, high = bounds[:, :2].min(axis=0) - margin, bounds[:, 2:].max(axis=0) + margin
+            low = np.where(frame.cell_size > 0.0, inner_low, low)
+            high = np.where(frame.cell_size > 0.0, inner_high, high)
         else:
             low, high = np.array(window[:2], dtype=float), np.array(window[2:], dtype=float)
+            if frame.slid is not None and (low[1] < inner_low[1] or high[1] > inner_high[1]):
+                raise ResultError("the window must keep the range of the kernel away from the upper and lower border "
+                                  f"of the sheared cell: {inner_low[1]:g} to {inner_high[1]:g} m")
         if np.any(high - low < 2.0 * spacing):
             raise ResultError("the window must be at least two spacings wide and high")
         self.x = np.arange(low[0] + 0.5 * spacing, high[0], spacing)
         self.y = np.arange(low[1] + 0.5 * spacing, high[1], spacing)
         self._reach = int(np.ceil(kernel.range / spacing))
         self._steps: IntArray = np.arange(-self._reach, self._reach + 1)
+
+    def spread_copies(self, frame: Frame, points: FloatArray, carried: FloatArray) -> FloatArray:
+        """The same with the copies of a periodic cell."""
+        corners = rectangle(self.x[0], self.y[0], self.x[-1], self.y[-1])
+        parts = [self.spread(points + shift, carried) for shift in shifts_into(frame, corners)]
+        total: FloatArray = np.sum(parts, axis=0)
+        return total
 
     def spread(self, points: FloatArray, carried: FloatArray) -> FloatArray:
         """Sum over points of what they carry times their weights per area, (rows, columns, carried)."""

@@ -7,7 +7,7 @@ from typing import Any
 from ..base.polygons import area_of
 from ..read.frames import Frame
 from ..read.tables import need
-from .windows import Window, area_inside, outline_of
+from .windows import Window, area_inside, outline_of, shifts_into
 
 
 def solid_fraction(frame: Frame, window: Window, *, fixed: bool = True, union: bool = False) -> float:
@@ -15,7 +15,7 @@ def solid_fraction(frame: Frame, window: Window, *, fixed: bool = True, union: b
 
     The areas are exact: polygons that cross the edge of the window are clipped (Sutherland & Hodgman, Commun. ACM 17
     (1974) 32). Where bodies overlap their areas count twice; with `union` they count once, for which the package
-    shapely is needed. `fixed=False` leaves fixed bodies out.
+    shapely is needed. `fixed=False` leaves fixed bodies out. In a periodic cell copies count as bodies do.
     """
     outline = outline_of(window)
     chosen = frame.free | (frame.fixed if fixed else False)
@@ -26,5 +26,7 @@ def solid_fraction(frame: Frame, window: Window, *, fixed: bool = True, union: b
 
 def _united_area(frame: Frame, outline: Any, chosen: Any) -> float:
     shapely = need("shapely", "shapely", "solid_fraction(union=True)")
-    polygons = [shapely.Polygon(vertices) for vertices, wanted in zip(frame.vertices, chosen) if wanted]
+    polygons = [shapely.Polygon(vertices + shift) for shift in shifts_into(frame, outline)
+                for vertices, wanted in zip(frame.vertices, chosen & ~(frame.spans & (shift != 0.0)).any(axis=1))
+                if wanted]
     return float(shapely.union_all(polygons).intersection(shapely.Polygon(outline)).area)

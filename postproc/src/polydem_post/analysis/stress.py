@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.polygons import FloatArray, area_of
 from ..read.frames import Frame
-from .windows import Window, contains, outline_of, share_inside
+from .windows import Window, contains, outline_of, share_inside, shifts_into
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,22 @@ def stress_tensor(frame: Frame, window: Window) -> Stress:
     Kinetic part: sigma_ij = (1/A) sum over free bodies with their centres inside of m u_i u_j, u the velocity
     relative to the mean velocity of their mass. Without contacts in the result the contact part is an error, not
     zero.
+
+    In a periodic cell copies count as bodies and contacts do: with the whole cell as window each of them counts once.
     """
     outline = outline_of(window)
     area = area_of(outline)
     start, end, force = branches(frame)
-    share = share_inside(outline, start, end)
+    share = np.zeros(len(force))
+    inside = np.zeros(len(frame), dtype=np.int64)
+    for shift in shifts_into(frame, outline):
+        share += share_inside(outline - shift, start, end)
+        inside += frame.free & contains(outline - shift, frame.position)
     contact = np.einsum("c,ci,cj->ij", share, force, start - end) / area
-    inside = frame.free & contains(outline, frame.position)
     kinetic = np.zeros((2, 2))
     if inside.any():
-        mass, velocity = frame.mass[inside], frame.velocity[inside]
+        counted = inside > 0
+        mass, velocity = frame.mass[counted] * inside[counted], frame.velocity[counted]
         relative = velocity - (mass @ velocity) / mass.sum()
         kinetic = np.einsum("b,bi,bj->ij", mass, relative, relative) / area
     return Stress(contact, kinetic, area)
@@ -79,10 +85,20 @@ def stress_tensor(frame: Frame, window: Window) -> Stress:
 def branches(frame: Frame) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Ends of the branch vectors (first body, second body) [m] and forces on the first body [N/m].
 
-    At a fixed body the end is the point of contact. Contacts between fixed bodies are left out.
+    At a fixed body the end is the point of contact. Contacts between fixed bodies are left out. In a periodic cell a
+    vector over the border begins or ends outside.
     """
     contacts = frame.contacts
     kept = ~(frame.fixed[contacts.first_index] & frame.fixed[contacts.second_index])
+    if frame.cell_size.any():
+        first, second = contacts.first_index[kept], contacts.second_index[kept]
+        # The vectors lead from one of the bodies to the nearest copy of the other one.
+        start, end = frame.position[first], frame.position[second]
+        with_first, with_second = frame.fixed[first][:, None], frame.fixed[second][:, None]
+        start = np.where(with_first, end + contacts.second_arm[kept], start)
+        end = np.where(with_first, end, start - contacts.branch[kept])
+        end = np.where(with_second, start + contacts.first_arm[kept], end)
+        return start, end, contacts.force[kept]
     ends = [np.where(frame.fixed[index][:, None], contacts.point, frame.position[index])[kept]
             for index in (contacts.first_index, contacts.second_index)]
     return ends[0], ends[1], contacts.force[kept]

@@ -34,6 +34,28 @@ def outline_of(window: Any) -> FloatArray:
     return outline
 
 
+def shifts_into(frame: Frame, window: FloatArray) -> FloatArray:
+    """Vectors by which bodies are moved to be counted in a window: none, and those to the copies of a periodic cell.
+
+    ResultError if the window reaches beyond the copies around the cell, or out of a sheared cell along y, where copies
+    have other velocities.
+    """
+    own = np.zeros((1, 2))
+    periodic = frame.cell_size > 0.0
+    if not periodic.any():
+        return own
+    margin = np.where(periodic, frame.cell_size, np.inf)
+    if frame.shift > 0.0:
+        margin[1] = 0.0
+    slack = 1e-9 * frame.cell_size
+    low, high = frame.cell_low - margin - slack, frame.cell_low + frame.cell_size + margin + slack
+    if np.any(window.min(axis=0) < low) or np.any(window.max(axis=0) > high):
+        raise ResultError("the window cannot be used: it reaches further out of the periodic cell than its copies; "
+                          f"the cell is {frame.cell_size[0]:g} m wide and {frame.cell_size[1]:g} m high, from "
+                          f"{frame.cell_low[0]:g}, {frame.cell_low[1]:g}")
+    return np.concatenate([own, frame.shifts])
+
+
 def _edges(window: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
     """A point and the outward normal of each edge."""
     after = np.roll(window, -1, axis=0)
@@ -62,7 +84,20 @@ def share_inside(window: FloatArray, start: FloatArray, end: FloatArray) -> Floa
 
 
 def area_inside(frame: Frame, window: FloatArray) -> FloatArray:
-    """The area of each body inside the window [m2], (n): exact, by clipping the polygons that cross its edge."""
+    """The area of each body inside the window [m2], (n): exact, by clipping the polygons that cross its edge.
+
+    In a periodic cell that of all copies of the body.
+    """
+    area = np.zeros(len(frame))
+    for shift in shifts_into(frame, window):
+        # Fixed bodies that span the cell have no copies along it.
+        alone = (frame.spans & (shift != 0.0)).any(axis=1)
+        area += np.where(alone, 0.0, _own_area_inside(frame, window - shift))
+    return area
+
+
+def _own_area_inside(frame: Frame, window: FloatArray) -> FloatArray:
+    """The area of each body inside the window, without copies [m2], (n)."""
     area = np.zeros(len(frame))
     low, high = window.min(axis=0), window.max(axis=0)
     bounds = frame.bounds

@@ -197,6 +197,12 @@ class Frame:
             copies = np.concatenate([copies, [(-2.0, 1.0), (2.0, -1.0)]])
         return copies * self.cell_size + np.outer(copies[:, 1], [self.shift, 0.0])
 
+    @cached_property
+    def spans(self) -> npt.NDArray[np.bool_]:
+        """Whether each body is a fixed one that is about as long as the cell and has no copies along it, (n, 2)."""
+        reach = np.abs(self.bounds.reshape(-1, 2, 2) - self.position[:, None, :]).max(axis=1)
+        return self.fixed[:, None] & (self.cell_size > 0.0) & (4.0 * reach >= self.cell_size)
+
     def nearest(self, first: IntArray, second: IntArray, vectors: FloatArray) -> FloatArray:
         """Vectors between bodies of these indices as those to the nearest copies [m], (k, 2).
 
@@ -207,9 +213,7 @@ class Frame:
             nearest[:, 0] -= np.rint(vectors[:, 1] / self.cell_size[1]) * self.shift
         for axis in np.flatnonzero(self.cell_size > 0.0):
             size = self.cell_size[axis]
-            reach = np.abs(self.bounds[:, [axis, axis + 2]] - self.position[:, [axis]]).max(axis=1)
-            spans = self.fixed & (4.0 * reach >= size)
-            folded = ~(spans[first] | spans[second])
+            folded = ~(self.spans[first, axis] | self.spans[second, axis])
             nearest[folded, axis] -= np.rint(nearest[folded, axis] / size) * size
         return nearest
 
