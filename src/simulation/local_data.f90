@@ -107,11 +107,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(finder_statistics_t) :: statistics
 
-      if (allocated(self%neighbours%finder)) then
-         statistics = self%neighbours%finder%work
-         ! gfortran 12 loses a part of a finder that is not deallocated before an argument with intent(out).
-         deallocate (self%neighbours%finder)
-      end if
+      if (allocated(self%neighbours%finder)) statistics = self%neighbours%finder%work
       associate (choice => self%settings%neighbours)
          call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin, self%bodies%isa)
       end associate
