@@ -37,7 +37,6 @@ OTHERS = {
     "inputs/glossary.md",
     "inputs/log.md",
     "inputs/parts.md",
-    "inputs/sources.md",
     "inputs/stages.md",
     "inputs/walls.md",
     "src/README.md",

@@ -53,8 +53,8 @@ contains
       groups = ' &forces gravity = 1, -10 drag = 2 / &integrate duration = 100 '//scheme//' /'//rest
       call list%append(square(-50.0_wp), fixed=.true.)
       call list%append(square(50.0_wp), velocity=[1.0_wp, 2.0_wp])
-      call begin('&source name = ''feed'' low = -1, -1 high = 1, 1 rate = 29 interval = 350 velocity = 3, -2 /'//groups, &
-                 list, entering, error)
+      call begin('&source name = ''feed'' low = -1, -1 high = 1, 1 rate = 29 interval = 350 velocity = 3, -2 /'// &
+                 groups, list, entering, error)
       call table%note_error(error)
       if (allocated(error)) return
       source = entering%traffic%sources(1)
@@ -92,9 +92,9 @@ contains
       logical, intent(in) :: thorough
       real(wp) :: rate(2)
 
-      call measure(table, thorough, 150, rate(1))
-      call measure(table, thorough, 250, rate(2))
-      call table%expect_relative('rate with 250 grains over that with 150', 1.0_wp, rate(2)/rate(1), 0.1_wp)
+      call measure(table, thorough, 300, rate(1))
+      call measure(table, thorough, 450, rate(2))
+      call table%expect_relative('rate with 450 grains over that with 300', 1.0_wp, rate(2)/rate(1), 0.1_wp)
    end subroutine flow
 
    !> Measure the rate of a hopper with some grains, in four parts of the time.
@@ -116,10 +116,10 @@ contains
 
       name = to_text(int(n_grains, ip))//' grains: '
       rate = 1.0_wp
-      part = merge(50000, 10000, thorough)
+      part = merge(50000, 7000, thorough)
       call read_settings_text('flow.nml', &
-         '&wall name = ''l'' outline = ''polyline'' vertices = -0.1, 0.6, -0.1, 0.1, -0.03, 0 thickness = 0.01 / '// &
-         '&wall name = ''r'' outline = ''polyline'' vertices = 0.03, 0, 0.1, 0.1, 0.1, 0.6 thickness = 0.01 / '// &
+         '&wall name = ''l'' outline = ''polyline'' vertices = -0.1, 0.6, -0.1, 0.1, -0.0225, 0 thickness = 0.01 / '// &
+         '&wall name = ''r'' outline = ''polyline'' vertices = 0.0225, 0, 0.1, 0.1, 0.1, 0.6 thickness = 0.01 / '// &
          '&source name = ''feed'' low = -0.09, 0.4 high = 0.09, 0.58 velocity = 0, -1 count = '// &
          to_text(int(n_grains, ip))//' / &sink name = ''bin'' low = -1, -0.2 high = 1, -0.02 interval = 100 / '// &
          '&forces stiffness = 2e5 friction_coefficient = 0.3 / &integrate duration = 1000 dt = 5e-5 /'//rest, &

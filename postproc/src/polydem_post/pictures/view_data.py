@@ -6,6 +6,7 @@ import base64
 import tempfile
 import zlib
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -137,7 +138,7 @@ class _Everybody:
         outlines: dict[int, tuple] = {}
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
         before, lists = None, 0
-        self._bodies: dict | None = None
+        self._bodies: dict[str, Any] | None = None
         for frame in frames:
             if before is not None and np.array_equal(before, frame.id):
                 continue
@@ -162,7 +163,7 @@ class _Everybody:
         if self._bodies is None:
             return frame, None
         present = np.isin(self._bodies["id"], frame.id)
-        columns = {}
+        columns: dict[str, Any] = {}
         for name in ("position", "angle", "velocity", "angular_velocity", "image", "slid"):
             values = getattr(frame, name)
             if values is None:
