@@ -9,7 +9,7 @@ module polydem_bodies_in_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: set_cell, find_folds, wrap_bodies, put_into_cell
+   public :: set_cell, find_folds, wrap_bodies, put_into_cell, path_of
 
 contains
 
@@ -48,6 +48,17 @@ contains
 
       reach = maxval(abs(bodies%pieces%turned_polygon(s)), 2)
    end function reach_of
+
+   !> Place of a fixed body on its path through the copies of the cell, (2) [m]; its position in the plane
+   pure function path_of(bodies, s) result(place)
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      real(wp) :: place(2)
+
+      place = bodies%position(:, s)
+      if (allocated(bodies%image)) place = place + real(bodies%image(s, :), wp)*bodies%cell%size
+   end function path_of
 
    !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
    pure subroutine wrap_bodies(bodies, slots)

@@ -66,7 +66,8 @@ contains
          if (stage%below > 0.0_wp .and. stage%above > 0.0_wp) call blame('stage', stage%name, 'above', &
             'cannot be combined with ''below''; give only one of them', instances, error)
          if (.not. (stage%below > 0.0_wp .or. stage%above > 0.0_wp)) call blame('stage', stage%name, 'until', &
-            '= '//quoted(stage%until)//' needs a limit: give ''below'' or ''above'', for example below = 1e-3', &
+            '= '//quoted(stage%until)//' needs a limit: give ''below'' or ''above'', for example '// &
+            trim(merge('above = 0.1 ', 'below = 1e-3', stage%until == 'strain')), &
             instances, error)
          if (stage%hold >= stage%longest) call blame('stage', stage%name, 'hold', 'must be less than ''longest''', &
             instances, error)

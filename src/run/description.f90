@@ -240,7 +240,7 @@ contains
       end associate
    end function gravity_text
 
-   !> Kinds of the motions and number of bodies of each moving wall
+   !> Kinds of the motions and number of bodies of each wall that moves or yields
    function motion_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation
       character(len=:), allocatable :: text
@@ -249,7 +249,10 @@ contains
       text = ''
       do k = 1, size(simulation%walls)
          associate (wall => simulation%walls(k))
-            text = text//', '//join(wall%motions%kind, ' and ')//' of '//counted(size(wall%slots, kind=lp), 'wall')
+            text = text//', '//join(wall%motions%kind, ' and ')
+            if (wall%is_loaded .and. size(wall%motions) > 0) text = text//' and '
+            if (wall%is_loaded) text = text//'yielding'
+            text = text//' of '//counted(size(wall%slots, kind=lp), 'wall')
          end associate
       end do
    end function motion_text

@@ -175,7 +175,8 @@ contains
                measures%deepest//'. All contacts store '//to_text(measures%stored, 3)//' J/m, which can '// &
                'accelerate all free bodies to '// &
                to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
-               ' m/s. Separate the bodies: set remove_overlap in &scene')
+               ' m/s. Separate the bodies: '//merge('set   ', 'reduce', &
+               .not. simulation%settings%scene%remove_overlap > 0.0_wp)//' remove_overlap in &scene')
    end subroutine warn_of_overlaps
 
    !> Warn of bodies that can pass through others: by moving too far in one step, or by their momentum.

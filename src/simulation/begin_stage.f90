@@ -2,6 +2,7 @@
 !>
 !> A stage changes parameters only. Force law, contact history and time step stay those of the whole run.
 module polydem_begin_stage
+   use polydem_bodies_in_cell, only: path_of
    use polydem_changed_gravity, only: change_gravity
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
@@ -176,7 +177,7 @@ contains
             if (self%named%wall(k)%name /= name) cycle
             associate (id => self%named%wall(k)%id)
                do j = 1, size(id)
-                  centre = centre + self%bodies%position(:, place_in(self%bodies%id, id(j)))/real(size(id), wp)
+                  centre = centre + path_of(self%bodies, place_in(self%bodies%id, id(j)))/real(size(id), wp)
                end do
             end associate
          end do

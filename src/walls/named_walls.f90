@@ -1,6 +1,7 @@
 !> Named walls of a scene: which bodies belong to each of them. All ranks have all fixed bodies.
 module polydem_named_walls
    use polydem_bodies, only: bodies_t
+   use polydem_bodies_in_cell, only: path_of
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
@@ -135,7 +136,7 @@ contains
       self%wall%is_gone = flags == 1_ip
    end subroutine serialize_gates
 
-   !> Mean of the centres of mass of the bodies of a wall [m]
+   !> Mean of the centres of mass of the bodies of a wall, on their paths through the copies of a periodic cell [m]
    pure function centre(self, w, bodies)
       class(named_walls_t), intent(in) :: self
       !> Number of the wall
@@ -147,7 +148,7 @@ contains
       centre = 0.0_wp
       associate (slots => self%wall(w)%slots)
          do k = 1, size(slots)
-            centre = centre + bodies%position(:, slots(k))
+            centre = centre + path_of(bodies, slots(k))
          end do
          if (size(slots) > 0) centre = centre/real(size(slots), wp)
       end associate
