@@ -8,6 +8,7 @@ module polydem_read_settings
    use polydem_check_materials, only: check_materials
    use polydem_check_parts, only: check_parts
    use polydem_check_settings, only: check_settings
+   use polydem_check_area, only: check_area
    use polydem_check_stages, only: check_stages
    use polydem_errors, only: error_t
    use polydem_exclusive_entries, only: resolve_exclusive_entries
@@ -68,6 +69,7 @@ contains
          call check_materials(settings, instances, error)
          call check_settings(settings, instances, error)
          call check_stages(settings, instances, error)
+         call check_area(settings, instances, error)
          call expand_short_motion(settings)
       type is (bench_settings_t)
          call read_values(file_name, text, overrides, .true., settings%source_locations_t, instances, error)

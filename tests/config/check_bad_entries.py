@@ -63,6 +63,7 @@ PARTS = {
 }
 #: Required entries of groups that need a scene of parts
 REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x"}, "stage": {},
+            "sample": {},
             "contact_pair": {"materials": f"'{NAME}', '{NAME}'", "friction_coefficient": "0.1"}}
 #: What is not a number, or not one number
 NO_NUMBERS = ("'text'", "word", ".true.", "nan", "NaN", "inf", "-inf", "Infinity", "", "1 2 3", "1, 2, 3", ",", "1,,2",
@@ -154,6 +155,11 @@ def with_required(row):
             entries.update({"duration": "1"} if until == "duration" else {"longest": "1", "below": "1"})
             entries.update({"wall": f"'{NAME}'", "opposite": f"'{NAME}'"} if until == "strain" else {})
             entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
+            entries.update({"component": "xx"} if until == "stress" else {})
+        if entries.get("area") == "rectangle":
+            entries.update({"low": "0, 0", "high": "1, 1"})
+        if row.group == "sample" and word == "walls":
+            entries.update({"sides": f"'{NAME}', '{NAME}'"})
         if entries.get("direction") == "angle":
             entries["torque"] = "1"
         groups = {**({} if row.group == "cell" else parts), row.group: entries}
