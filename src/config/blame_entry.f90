@@ -25,8 +25,8 @@ contains
          if (instance%values(row_of(instance, other))%is_override .and. .not. instance%values(row)%is_override) &
             row = row_of(instance, other)
       end if
-      call raise(error, input_error, instance%values(row)%place//': '''//key//''' in &'//trim(instance%group)//' '// &
-                 instance%name//' '//problem)
+      call raise(error, input_error, instance%values(row)%place//': '''//key//''' in &'// &
+                 trim(trim(instance%group)//' '//instance%name)//' '//problem)
    end subroutine blame
 
 end module polydem_blame_entry

@@ -134,7 +134,7 @@ contains
    end subroutine check_group
 
    !> Check a wall that consists of bodies of a file: there is a file, a motion moves the wall, a load acts on it, it
-   !> vanishes or the series has it, and no other wall has its bodies.
+   !> vanishes, bounds the sample or the series has it, and no other wall has its bodies.
    pure subroutine check_bodies(settings, w, instances, error)
       type(settings_t), intent(in) :: settings
       !> Number of the wall
@@ -158,8 +158,14 @@ contains
          do k = 1, size(settings%stage)
             is_used = is_used .or. any([settings%stage(k)%wall, settings%stage(k)%opposite] == wall%name)
          end do
+         do k = 1, size(settings%sample%sides)
+            is_used = is_used .or. settings%sample%sides(k)%text == wall%name
+         end do
+         do k = 1, size(settings%sample%ends)
+            is_used = is_used .or. settings%sample%ends(k)%text == wall%name
+         end do
          if (.not. is_used) call blame(instance, 'outline', '= ''bodies'' gives a name to bodies that no '// &
-            '&motion, &load or &stage uses; leave out this wall, or write wall = '//quoted(wall%name)// &
+            '&motion, &load, &stage or &sample uses; leave out this wall, or write wall = '//quoted(wall%name)// &
             ' in a &motion', error)
          do k = 1, w - 1
             do j = 1, size(settings%wall(k)%bodies)

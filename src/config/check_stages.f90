@@ -73,6 +73,9 @@ contains
             instances, error)
          if (stage%until == 'strain' .and. stage%wall == stage%opposite) call blame('stage', stage%name, 'opposite', &
             'must be another wall than ''wall''', instances, error)
+         if (stage%until == 'stress' .and. settings%sample%area == 'none' .and. settings%cell%periodic /= 'xy') call &
+            blame('stage', stage%name, 'until', '= ''stress'' needs the area of the sample; give ''area'' in '// &
+            '&sample', instances, error)
          if (any(stage%until == [character(len=14) :: 'count', 'solid_fraction']) &
              .and. .not. all(stage%low < stage%high)) call blame('stage', stage%name, 'high', &
             'must exceed ''low'' along x and y', instances, error)

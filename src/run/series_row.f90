@@ -1,5 +1,6 @@
 !> What a row of the series of a run contains: the one place where its columns come together.
 module polydem_series_row
+   use polydem_sample_columns, only: set_sample_columns
    use polydem_simulation, only: simulation_t
    use polydem_wall_load, only: set_load_columns
    implicit none
@@ -11,9 +12,10 @@ contains
    !> Set all columns of the present row at the end of a step. Every call gives the same columns in the same order, and
    !> all ranks get the same values: they are exact sums, or the same on all ranks anyway. Collective.
    subroutine collect_row(self)
-      !> The simulation; the row of `series` is set
+      !> The simulation with the table of contacts of this step; the row of `series` is set
       type(simulation_t), intent(inout) :: self
 
+      call set_sample_columns(self, self%series%row)
       call self%record%set_columns(self%comm, self%dt, self%named, self%bodies, self%walk%walls, self%series%row)
       if (allocated(self%loads)) call set_load_columns(self%loads, self%dt, self%series%row)
       if (allocated(self%traffic)) call self%traffic%set_columns(self%series%row)

@@ -8,7 +8,8 @@ module polydem_end_condition
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: lp, wp
-   use polydem_quantities, only: count_grains, kinetic_energy, solid_fraction, unbalanced_force
+   use polydem_quantities, only: count_grains, kinetic_energy, solid_fraction, stress, unbalanced_force
+   use polydem_sample_area, only: find_area, sample_area_t
    use polydem_settings, only: stage_settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
@@ -42,7 +43,8 @@ contains
       integer(lp), intent(in) :: step
 
       needs_contacts = is_check(simulation, step)
-      if (needs_contacts) needs_contacts = simulation%settings%stage(simulation%stages%number)%until == 'unbalanced'
+      if (needs_contacts) needs_contacts = any(simulation%settings%stage( &
+         simulation%stages%number)%until == [character(len=10) :: 'unbalanced', 'stress'])
    end function needs_contacts
 
    !> Measure the quantity of the present stage if this step is a check. Collective.
@@ -60,8 +62,10 @@ contains
             call unbalanced_force(simulation, value)
          case ('count')
             call count_grains(simulation, stage%low, stage%high, value)
+         case ('stress')
+            call measure_stress(simulation, stage%component, value)
          case ('solid_fraction')
-            call solid_fraction(simulation, stage%low, stage%high, value)
+            call solid_fraction(simulation, sample_area_t(stage%low, stage%high, stage%high - stage%low), value)
          case default
             associate (reference => simulation%stages%reference)
                moved = wall_vector(simulation) - reference
@@ -71,6 +75,25 @@ contains
       end associate
       simulation%stages%value = value
    end subroutine measure_condition
+
+   !> Measure the magnitude of a component of the mean stress of the sample. Collective.
+   subroutine measure_stress(simulation, component, value)
+      type(simulation_t), intent(inout) :: simulation
+      !> 'pressure', 'xx', 'xy', 'yx' or 'yy'
+      character(len=*), intent(in) :: component
+      !> The magnitude [N/m2]
+      real(wp), intent(out) :: value
+      type(sample_area_t) :: area
+      real(wp) :: tensor(2, 2)
+
+      call find_area(simulation, area)
+      call stress(simulation, area, tensor)
+      if (component == 'pressure') then
+         value = abs(0.5_wp*(tensor(1, 1) + tensor(2, 2)))
+      else
+         value = abs(tensor(scan('xy', component(1:1)), scan('xy', component(2:2))))
+      end if
+   end subroutine measure_stress
 
    !> Decide after a check whether the next step is the last of the stage.
    subroutine decide_end(simulation)

@@ -4,6 +4,7 @@
 !> the table of contacts of the step (`advance` with `tabulate`).
 module polydem_quantities
    use polydem_bodies, only: bodies_t
+   use polydem_cell, only: cell_t
    use polydem_contacts, only: contact_force
    use polydem_elementary, only: hypotenuse
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
@@ -12,10 +13,12 @@ module polydem_quantities
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_polygon, only: signed_area
+   use polydem_sample_area, only: sample_area_t
    use polydem_simulation, only: simulation_t
    implicit none
    private
-   public :: kinetic_energy, unbalanced_force, coordination, count_grains, solid_fraction, stress, inertial_number
+   public :: kinetic_energy, unbalanced_force, coordination, count_grains, solid_fraction, stress, flow, &
+      inertial_number
 
 contains
 
@@ -112,12 +115,12 @@ contains
       number = real(counts(1), wp)
    end subroutine count_grains
 
-   !> Find the solid fraction in a rectangle: the area of the free bodies whose centres are in it, over its area.
+   !> Find the solid fraction in an area: the area of the free bodies whose centres are in it, over its area.
    !> Collective.
-   subroutine solid_fraction(simulation, low, high, fraction)
+   subroutine solid_fraction(simulation, area, fraction)
       type(simulation_t), intent(inout) :: simulation
-      !> Lower left and upper right corner of the rectangle, (2) [m]
-      real(wp), intent(in) :: low(2), high(2)
+      !> The area
+      type(sample_area_t), intent(in) :: area
       !> The fraction; overlaps count twice
       real(wp), intent(out) :: fraction
       type(exact_sum_t) :: sums(1)
@@ -126,25 +129,25 @@ contains
 
       associate (bodies => simulation%bodies)
          do k = 1_ip, size(bodies%free, kind=ip)
-            if (is_inside(bodies%position(:, bodies%free(k)), low, high)) &
+            if (is_inside(bodies%position(:, bodies%free(k)), area%low, area%high)) &
                call sums(1)%add(signed_area(bodies%pieces%polygon(bodies%free(k))))
          end do
       end associate
       call all_reduce_exact_sums(simulation%comm, sums)
       total = sums%value()
-      fraction = total(1)/((high(1) - low(1))*(high(2) - low(2)))
+      fraction = total(1)/(area%size(1)*area%size(2))
    end subroutine solid_fraction
 
-   !> Find the mean stress of the contacts in an area: the sum over the contacts of free bodies of the outer product of
-   !> the vector from the centre of the body to the contact and the force on the body, over the area, with the sign of
-   !> soil mechanics: positive in compression. For contacts in equilibrium this is the formula of Love and Weber.
-   !> Collective.
+   !> Find the mean stress of the contacts in an area: the sum over the contacts of the free bodies in it of the outer
+   !> product of the vector from the centre of the body to the contact and the force on the body, over the area, with
+   !> the sign of soil mechanics: positive in compression. For contacts in equilibrium this is the formula of Love and
+   !> Weber. Collective.
    subroutine stress(simulation, area, tensor)
       !> The simulation with the table of contacts of this step
       type(simulation_t), intent(inout) :: simulation
-      !> Area that the sample occupies [m2]
-      real(wp), intent(in) :: area
-      !> Stress, (direction of the vector, direction of the force) [N/m]
+      !> Area of the sample
+      type(sample_area_t), intent(in) :: area
+      !> Stress, (direction of the vector, direction of the force) [N/m2]
       real(wp), intent(out) :: tensor(2, 2)
       type(exact_sum_t) :: sums(4)
       real(wp) :: force(2)
@@ -153,12 +156,12 @@ contains
       associate (bodies => simulation%bodies, contacts => simulation%contacts)
          do c = 1_ip, contacts%n
             force = contact_force(contacts, c)
-            if (is_mine(bodies, contacts%first(c))) call add(contacts%arm_first(:, c), force)
-            if (is_mine(bodies, contacts%second(c))) call add(contacts%arm_second(:, c), -force)
+            if (counts(contacts%first(c))) call add(contacts%arm_first(:, c), force)
+            if (counts(contacts%second(c))) call add(contacts%arm_second(:, c), -force)
          end do
       end associate
       call all_reduce_exact_sums(simulation%comm, sums)
-      tensor = reshape(-sums%value(), [2, 2])/area
+      tensor = reshape(-sums%value(), [2, 2])/area%size(1)/area%size(2)
 
    contains
 
@@ -174,7 +177,92 @@ contains
          end do
       end subroutine add
 
+      !> Whether this rank moves a body, and it is in the area
+      pure logical function counts(s)
+         !> Slot of the body
+         integer(ip), intent(in) :: s
+
+         counts = is_mine(simulation%bodies, s)
+         if (counts) counts = is_inside(simulation%bodies%position(:, s), area%low, area%high)
+      end function counts
+
    end subroutine stress
+
+   !> Find the rate at which the bodies in an area shear: that of the linear field of velocities that fits them best, by
+   !> least squares; and the mean size and density of these bodies. Along an axis of a periodic cell the field does not
+   !> change, but for the jump at the border of a sheared cell. Collective.
+   subroutine flow(simulation, area, rate, diameter, density)
+      type(simulation_t), intent(inout) :: simulation
+      !> Area of the sample
+      type(sample_area_t), intent(in) :: area
+      !> Difference of the principal rates of strain, which is the rate of a simple shear; 0 without bodies [1/s]
+      real(wp), intent(out) :: rate
+      !> Diameter of a circle with the mean area of the bodies [m], and their mass over their area [kg/m3]
+      real(wp), intent(out) :: diameter, density
+      !> Twice the square root of 1/pi
+      real(wp), parameter :: diameter_of_area = 1.1283791670955126_wp
+      type(exact_sum_t) :: sums(14)
+      real(wp) :: total(14), origin(2), x(2), v(2)
+      integer(ip) :: k
+      integer :: i
+
+      associate (bodies => simulation%bodies, cell => simulation%bodies%cell)
+         origin = merge(area%low, 0.0_wp, area%high < huge(1.0_wp))
+         do k = 1_ip, size(bodies%free, kind=ip)
+            associate (s => bodies%free(k))
+               if (.not. is_inside(bodies%position(:, s), area%low, area%high)) cycle
+               x = merge(0.0_wp, bodies%position(:, s) - origin, cell%size > 0.0_wp)
+               v = bodies%velocity(:, s)
+               total = [1.0_wp, signed_area(bodies%pieces%polygon(s)), bodies%mass(s), x, v, &
+                        x(1)*x(1), x(1)*x(2), x(2)*x(2), x(1)*v(1), x(1)*v(2), x(2)*v(1), x(2)*v(2)]
+            end associate
+            do i = 1, size(sums)
+               call sums(i)%add(total(i))
+            end do
+         end do
+         call all_reduce_exact_sums(simulation%comm, sums)
+         total = sums%value()
+         diameter = diameter_of_area*sqrt(ratio(total(2), total(1)))
+         density = ratio(total(3), total(2))
+         rate = rate_of_shear(total/max(total(1), 1.0_wp), cell)
+      end associate
+   end subroutine flow
+
+   !> Difference of the principal rates of strain of the field that fits velocities [1/s]
+   pure real(wp) function rate_of_shear(mean, cell) result(rate)
+      !> Means over bodies, in the order of `flow`
+      real(wp), intent(in) :: mean(14)
+      type(cell_t), intent(in) :: cell
+      real(wp) :: moment(2, 2), mixed(2, 2), gradient(2, 2)
+
+      moment(1, :) = mean([8, 9]) - mean(4)*mean(4:5)
+      moment(2, :) = mean([9, 10]) - mean(5)*mean(4:5)
+      mixed(1, :) = mean(11:12) - mean(4)*mean(6:7)
+      mixed(2, :) = mean(13:14) - mean(5)*mean(6:7)
+      gradient = fitted(moment, mixed)
+      if (cell%is_sheared) gradient(2, 1) = cell%jump/cell%size(2)
+      rate = hypotenuse(gradient(1, 1) - gradient(2, 2), gradient(1, 2) + gradient(2, 1))
+   end function rate_of_shear
+
+   !> Gradient of the field that fits velocities, (axis of the place, axis of the velocity); 0 along an axis along which
+   !> the places do not differ
+   pure function fitted(moment, mixed) result(gradient)
+      !> Covariances of the places, and of places and velocities (axis of the place, other axis)
+      real(wp), intent(in) :: moment(2, 2), mixed(2, 2)
+      real(wp) :: gradient(2, 2), determinant
+      integer :: i
+
+      gradient = 0.0_wp
+      determinant = moment(1, 1)*moment(2, 2) - moment(1, 2)*moment(1, 2)
+      if (determinant > 1.0e-9_wp*moment(1, 1)*moment(2, 2)) then
+         gradient(1, :) = (moment(2, 2)*mixed(1, :) - moment(1, 2)*mixed(2, :))/determinant
+         gradient(2, :) = (moment(1, 1)*mixed(2, :) - moment(1, 2)*mixed(1, :))/determinant
+         return
+      end if
+      do i = 1, 2
+         if (moment(i, i) > moment(3 - i, 3 - i)) gradient(i, :) = mixed(i, :)/moment(i, i)
+      end do
+   end function fitted
 
    !> Inertial number of a flow in the plane, the shear rate times d sqrt(rho/P) (GDR MiDi, Eur. Phys. J. E 14 (2004)
    !> 341): the ratio of the time in which pressure moves a grain by its diameter to that of the shear

@@ -65,6 +65,7 @@ PARTS = {
 REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x"}, "stage": {},
             "source": {"low": "0.3, 0.3", "high": "0.5, 0.5", "count": "9"},
             "sink": {"low": "-1, -3", "high": "2, -2.5"},
+            "sample": {},
             "contact_pair": {"materials": f"'{NAME}', '{NAME}'", "friction_coefficient": "0.1"}}
 #: What is not a number, or not one number
 NO_NUMBERS = ("'text'", "word", ".true.", "nan", "NaN", "inf", "-inf", "Infinity", "", "1 2 3", "1, 2, 3", ",", "1,,2",
@@ -158,6 +159,11 @@ def with_required(row):
             entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
         if row.group == "source":
             entries.update(PARTS["shape"][entries.setdefault("shape", "ellipse")])
+            entries.update({"component": "xx"} if until == "stress" else {})
+        if entries.get("area") == "rectangle":
+            entries.update({"low": "0, 0", "high": "1, 1"})
+        if row.group == "sample" and word == "walls":
+            entries.update({"sides": f"'{NAME}', '{NAME}'"})
         if entries.get("direction") == "angle":
             entries["torque"] = "1"
         groups = {**({"grains": parts["grains"]} if row.group == "cell" else parts), row.group: entries}

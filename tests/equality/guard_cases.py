@@ -118,6 +118,8 @@ VARIED = {
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
     "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
     "stage.one.gravity": "1, -20", "stage.one.friction_scale": "0.5", "stage.one.drag": "2",
+    "stage.one.component": None, "sample.low": "-0.05, -0.05", "sample.high": "0.05, 0.05", "sample.sides": None,
+    "sample.ends": None,
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
     "forces.restitution": "0.3",
@@ -154,6 +156,7 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
               "material.one.density": "1000", "scene.material": "one", "forces.damping_coefficient": "0.1",
               "contact_pair.one.materials": VARIED["contact_pair.one.materials"]},
           "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
+          **{f"sample.{key}": {"output.series_interval": "1e-3"} for key in ("area", "low", "high")},
           "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
@@ -161,6 +164,7 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
                                "scene.start_from", "stage.one.wall", "stage.one.opposite"),
                              "check_stages.py"),
              **dict.fromkeys(TRAFFIC, "tests/ranks: scene flow"),
+             **dict.fromkeys(("stage.one.component", "sample.sides", "sample.ends"), "test_time_series.py"),
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
              "cell.shear_ramp": "as cell.shear_rate", "grains.one.packing": "as scene.packing",
@@ -170,7 +174,8 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
 UNTRIED = {("source.one.shape", "regular"), ("source.one.shape", "rectangle"), ("source.one.shape", "outline"),
            ("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
-           ("stage.one.until", "strain"), ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"),
+           ("stage.one.until", "strain"), ("stage.one.until", "stress"), ("sample.area", "walls"),
+           ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"),
            ("grains.one.arrangement", "column")}
 
 #: Numbers of ranks of the program with MPI
@@ -332,7 +337,8 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED[entry.name] for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith(("scene.motion_", "motion.", "stage.", "load.", *PARTS)) and entry.condition
+            and entry.name.startswith(("scene.motion_", "motion.", "stage.", "load.", "sample.", *PARTS))
+            and entry.condition
             and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
 

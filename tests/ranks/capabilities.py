@@ -78,7 +78,8 @@ CAPABILITIES = {
         groups="&stage name = 'smooth' until = 'kinetic' below = 1e3 hold = 7e-3 longest = 1 check = 7"
                " friction_scale = 0 /\n"
                "&stage name = 'rough' duration = 0.011 gravity = 20, -20 /\n"),
-    "series": Capability(output="series_interval = 2e-4 csv = .true."),
+    "series": Capability(groups="&sample area = 'rectangle' low = -0.04, -0.04 high = 0.03, 0.04 /\n",
+                         output="series_interval = 2e-4 csv = .true."),
 }
 
 #: Pairs that the program refuses, and a part of its message

@@ -20,6 +20,7 @@ from .network import (
     rattlers,
 )
 from .profiles import Profile, profile
+from .sample import inertial_number, sample_fraction, sample_stress, shear_rate, unbalanced_force
 from .stress import Stress, body_stress, stress_tensor
 from .surface import Surface, SurfaceAngle, free_surface, surface_angle
 from .windows import Window, rectangle
@@ -28,6 +29,7 @@ __all__ = [
     "Anisotropy", "BlockAverage", "Displacements", "Distribution", "Fields", "FlowRate", "Kernel", "Profile",
     "ShortSeries", "Stress", "Surface", "SurfaceAngle", "Window", "anisotropy", "block_average", "body_stress",
     "coarse_grain", "coordination_number", "fabric_tensor", "flow_rate", "force_distribution", "free_surface",
-    "gaussian", "lacey_index", "lucy", "mass_beyond", "mean_squared_displacement", "profile", "rattlers", "rectangle",
-    "solid_fraction", "stress_tensor", "surface_angle",
+    "gaussian", "inertial_number", "lacey_index", "lucy", "mass_beyond", "mean_squared_displacement", "profile",
+    "rattlers", "rectangle", "sample_fraction", "sample_stress", "shear_rate", "solid_fraction",
+    "stress_tensor", "surface_angle", "unbalanced_force",
 ]
