@@ -11,7 +11,6 @@ module polydem_quantities
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_pair
-   use polydem_polygon, only: signed_area
    use polydem_simulation, only: simulation_t
    implicit none
    private
@@ -127,7 +126,7 @@ contains
       associate (bodies => simulation%bodies)
          do k = 1_ip, size(bodies%free, kind=ip)
             if (is_inside(bodies%position(:, bodies%free(k)), low, high)) &
-               call sums(1)%add(signed_area(bodies%pieces%polygon(bodies%free(k))))
+               call sums(1)%add(bodies%pieces%area_of(bodies%free(k)))
          end do
       end associate
       call all_reduce_exact_sums(simulation%comm, sums)
