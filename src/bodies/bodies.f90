@@ -1,7 +1,8 @@
 !> The bodies of a simulation as a structure of arrays.
 !>
-!> A body moves, freely or as prescribed. Its outline is a convex polygon, a piece (`polydem_pieces`). Its *slot* is its
-!> index in the arrays, which may change. Its *identifier* never changes. Slots are in ascending order of identifiers.
+!> A body moves, freely or as prescribed. It is one convex polygon or several, its pieces (`polydem_pieces`). Its *slot*
+!> is its index in the arrays, which may change. Its *identifier* never changes. Slots are in ascending order of
+!> identifiers.
 !> Fixed bodies are on every rank; a free body is on the rank that moves it and, as a halo body, on ranks nearby.
 !>
 !> World coordinates of a vertex are `position + turned`. They are not stored. Vectors between two near bodies start
@@ -17,8 +18,8 @@ module polydem_bodies
    use polydem_polygon, only: diameter, greatest_radius, thickness
    implicit none
    private
-   public :: bodies_t, allocate_bodies, allocate_with_corners, measure_bodies, turn_bodies, turn_block, &
-      find_directions, block_size, measure_sizes, state_hash, state_words, image_word
+   public :: bodies_t, piece_identifiers, allocate_bodies, allocate_with_corners, measure_bodies, turn_bodies, &
+      turn_block, find_directions, block_size, measure_sizes, state_hash, state_words, image_word
 
    !> Greatest number of bodies of a block for `turn_block`
    integer(ip), parameter :: block_size = 64_ip
@@ -78,13 +79,14 @@ module polydem_bodies
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]
       real(wp), allocatable :: torque(:)
-      !> Polygons of the bodies: piece s belongs to slot s
+      !> Polygons of the bodies
       type(pieces_t) :: pieces
       !> Greatest distance of a vertex from the centre of mass [m]
       real(wp), allocatable :: radius(:)
       !> Greatest distance between two vertices [m]
       real(wp), allocatable :: diameter(:)
-      !> Twice the least distance of an edge from the centre of mass [m]
+      !> Twice the least distance of an edge from the centre of mass; of several pieces the least, each about its own
+      !> centroid [m]
       real(wp), allocatable :: thickness(:)
       !> Whether the body is one of a wall that has vanished: it has no box and meets nothing, (slot); not allocated if
       !> no wall vanishes
@@ -114,18 +116,41 @@ contains
    end subroutine allocate_bodies
 
    !> Allocate the columns of bodies whose numbers of vertices are known, and set them to zero.
-   subroutine allocate_with_corners(bodies, corners)
+   subroutine allocate_with_corners(bodies, corners, most)
       type(bodies_t), intent(out) :: bodies
       !> Number of vertices of each body
       integer(ip), intent(in) :: corners(:)
+      !> Greatest number of pieces of a body of the run
+      integer(ip), intent(in) :: most
       integer(ip) :: s
 
       call allocate_bodies(bodies, size(corners, kind=ip), sum(corners))
       allocate (bodies%pieces%turned(2, sum(corners)), source=0.0_wp)
+      bodies%pieces%most = most
+      if (most > 1_ip) allocate (bodies%pieces%number(sum(corners)), source=0_ip)
       do s = 1_ip, bodies%n
          bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + corners(s)
       end do
    end subroutine allocate_with_corners
+
+   !> Identifiers of all pieces: that of the body times the greatest number of pieces, plus the number in the body. They
+   !> ascend; if every body has one piece, they are those of the bodies.
+   pure function piece_identifiers(bodies) result(id)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), allocatable :: id(:)
+      integer(ip) :: p
+
+      if (bodies%pieces%most == 1_ip) then
+         id = bodies%id
+         return
+      end if
+      associate (pieces => bodies%pieces)
+         allocate (id(size(pieces%body)))
+         do p = 1_ip, size(id, kind=ip)
+            id(p) = bodies%id(pieces%body(p))*pieces%most + (p - pieces%first(pieces%body(p)))
+         end do
+      end associate
+   end function piece_identifiers
 
    !> Update `turned` of the given bodies to their angles.
    subroutine turn_bodies(bodies, slots)
@@ -167,11 +192,26 @@ contains
          associate (shape => bodies%pieces%polygon(s))
             bodies%radius(s) = greatest_radius(shape)
             bodies%diameter(s) = diameter(shape)
-            bodies%thickness(s) = thickness(shape)
+            if (bodies%pieces%most == 1_ip) bodies%thickness(s) = thickness(shape)
          end associate
+         if (bodies%pieces%most > 1_ip) bodies%thickness(s) = least_thickness(bodies%pieces, s)
       end do
       !$omp end parallel do
    end subroutine measure_sizes
+
+   !> Least thickness of the pieces of a body, each about its centroid [m]
+   pure real(wp) function least_thickness(pieces, s) result(least)
+      type(pieces_t), intent(in) :: pieces
+      integer(ip), intent(in) :: s
+      integer(ip) :: p
+
+      least = huge(1.0_wp)
+      do p = pieces%first(s), pieces%first(s + 1_ip) - 1_ip
+         associate (shape => pieces%vertex(:, pieces%start(p):pieces%start(p + 1_ip) - 1_ip))
+            least = min(least, thickness(shape - spread(pieces%centre(:, p), 2, size(shape, 2))))
+         end associate
+      end do
+   end function least_thickness
 
    !> Update `turned` of up to `block_size` bodies to their angles.
    subroutine turn_block(bodies, slots, extent, direction)
@@ -193,6 +233,7 @@ contains
                                pieces%turned(:, first:last), extent(:, k))
          end associate
       end do
+      if (bodies%pieces%most > 1_ip) call bodies%pieces%turn_pieces(slots, direction)
    end subroutine turn_block
 
    !> Find cosine and sine of the angles of up to `block_size` bodies.

@@ -52,14 +52,14 @@ contains
       bodies%fixed = fixed == 1_ip
    end subroutine serialize_constants
 
-   !> Serialize the numbers of vertices of bodies, of which each has one piece.
+   !> Serialize the numbers of vertices of bodies.
    subroutine serialize_corners(serializer, corners)
       !> Serializer, which reads or writes columns over /pieces
       class(serializer_t), intent(inout) :: serializer
-      !> Number of vertices of each piece
+      !> Number of vertices of each body
       integer(ip), intent(inout), contiguous :: corners(:)
 
-      call serializer%field('/pieces/corners', corners, '1', 'number of vertices of the piece of each body')
+      call serializer%field('/pieces/corners', corners, '1', 'number of vertices of each body')
    end subroutine serialize_corners
 
    !> Serialize the vertices of bodies.
@@ -70,6 +70,8 @@ contains
 
       call serializer%field('/vertices/position', bodies%pieces%vertex, 'm', &
                             'vertices of each piece, anticlockwise, relative to the centre of mass at angle 0')
+      if (bodies%pieces%most > 1_ip) call serializer%field('/vertices/piece', bodies%pieces%number, '1', &
+         'number of the piece of each vertex within its body, from 0')
    end subroutine serialize_vertices
 
    !> Serialize what `measure_bodies` finds.

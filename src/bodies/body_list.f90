@@ -3,6 +3,7 @@ module polydem_body_list
    use polydem_bodies, only: allocate_bodies, bodies_t, measure_bodies, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
+   use polydem_piece_properties, only: join_pieces
    use polydem_polygon, only: clean_polygon, mass_properties
    use polydem_polygon_list, only: polygon_list_t
    use polydem_sort, only: ascending_order
@@ -29,6 +30,8 @@ module polydem_body_list
       real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
       !> Number of the material
       integer(ip) :: material = 0_ip
+      !> First vertex of each of its pieces and the number of vertices; not allocated for one piece
+      integer(ip), allocatable :: first(:)
    end type given_body_t
 
    !> A growing list of bodies before their mass properties are computed. One of several ranks keeps all fixed bodies
@@ -42,6 +45,8 @@ module polydem_body_list
       integer(ip) :: id_offset = 0_ip
       !> Whether the run has materials
       logical :: has_materials = .false.
+      !> Greatest number of pieces of a body, including those that the rank leaves to others
+      integer(ip) :: most_pieces = 1_ip
       !> Identifiers of all bodies, (n)
       integer(ip), allocatable, private :: id(:)
       !> Kept bodies, (polygons%n) or longer
@@ -64,9 +69,10 @@ contains
 
    !> Append a body. The default `mass` of a free body is density times area. Its default `inertia` is that of its mass
    !> spread evenly over the polygon. The default mass and moment of inertia of a fixed body are infinite.
-   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia, material)
+   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia, material, &
+                     piece)
       class(body_list_t), intent(inout) :: self
-      !> Vertices in world coordinates, clockwise or anticlockwise, (2, vertex) [m]
+      !> Vertices in world coordinates, clockwise or anticlockwise, those of each piece in turn, (2, vertex) [m]
       real(wp), intent(in) :: vertices(:, :)
       !> Whether the body is fixed, .false. if absent
       logical, intent(in), optional :: fixed
@@ -84,11 +90,17 @@ contains
       real(wp), intent(in), optional :: inertia
       !> Number of its material, 0 if absent
       integer(ip), intent(in), optional :: material
+      !> Number of the piece of each vertex, from 0 and ascending by steps of 1; absent: one piece
+      integer(ip), intent(in), optional :: piece(:)
       type(given_body_t) :: body
       type(given_body_t), allocatable :: longer(:)
       logical :: is_left
 
       if (present(fixed)) body%fixed = fixed
+      if (present(piece)) then
+         self%most_pieces = max(self%most_pieces, maxval(piece) + 1_ip)
+         if (maxval(piece) > 0_ip) body%first = starts_of(piece)
+      end if
       is_left = self%leaves_next() .and. .not. body%fixed
       call self%skip(id)
       if (is_left) return
@@ -110,6 +122,16 @@ contains
          self%body(n) = body
       end associate
    end subroutine append
+
+   !> First vertex of each piece, and the number of vertices
+   pure function starts_of(piece) result(first)
+      integer(ip), intent(in) :: piece(:)
+      integer(ip), allocatable :: first(:)
+      integer(ip) :: v
+
+      first = [0_ip, pack([(v, v=1_ip, size(piece, kind=ip) - 1_ip)], piece(2:) > piece(:size(piece) - 1)), &
+               size(piece, kind=ip)]
+   end function starts_of
 
    !> Whether the rank leaves the next body to another rank if it is free
    pure logical function leaves_next(self)
@@ -151,12 +173,26 @@ contains
       if (self%n > 0_ip) greatest_id = maxval(self%id(:self%n))
    end function greatest_id
 
-   !> Polygons of the bodies that the rank keeps, as they were given
-   pure function kept_polygons(self) result(polygons)
+   !> Polygons of the pieces of the bodies that the rank keeps, as they were given
+   function kept_polygons(self) result(polygons)
       class(body_list_t), intent(in) :: self
       type(polygon_list_t) :: polygons
+      real(wp), allocatable :: whole(:, :)
+      integer(ip) :: k, p
 
       polygons = self%polygons
+      if (self%most_pieces == 1_ip) return
+      polygons%n = 0_ip
+      do k = 1_ip, self%polygons%n
+         whole = self%polygons%polygon(k)
+         if (.not. allocated(self%body(k)%first)) then
+            call polygons%append_polygon(whole)
+            cycle
+         end if
+         do p = 1_ip, size(self%body(k)%first, kind=ip) - 1_ip
+            call polygons%append_polygon(whole(:, self%body(k)%first(p) + 1_ip:self%body(k)%first(p + 1_ip)))
+         end do
+      end do
    end function kept_polygons
 
    !> Check the polygons of the kept bodies and build the arrays, in ascending order of the identifiers, at angle 0.
@@ -180,6 +216,8 @@ contains
       bodies%n_all = list%n
       if (list%n > 0_ip) bodies%last_id = list%id(order(list%n))
       if (list%has_materials) allocate (bodies%material(bodies%n))
+      call check_identifiers(list, bodies, error)
+      if (allocated(error)) return
       s = 0_ip
       do k = 1_ip, list%n
          if (kept(order(k)) == 0_ip) cycle
@@ -212,6 +250,22 @@ contains
       end do
    end subroutine rank_identifiers
 
+   !> Prepare for bodies of several pieces. The identifier of a piece is that of its body times the greatest number of
+   !> pieces of a body, plus its number in the body.
+   subroutine check_identifiers(list, bodies, error)
+      type(body_list_t), intent(in) :: list
+      type(bodies_t), intent(inout) :: bodies
+      type(error_t), allocatable, intent(inout) :: error
+
+      bodies%pieces%most = list%most_pieces
+      if (list%most_pieces == 1_ip) return
+      allocate (bodies%pieces%number(size(bodies%pieces%vertex, 2)), source=0_ip)
+      if (bodies%last_id < huge(1_ip)/list%most_pieces) return
+      call raise(error, input_error, 'body '//to_text(bodies%last_id)//': with up to '//to_text(list%most_pieces)// &
+                 ' pieces of a body, identifiers must be less than '//to_text(huge(1_ip)/list%most_pieces)// &
+                 '; number the bodies anew')
+   end subroutine check_identifiers
+
    !> Check one body and store it in its slot.
    subroutine place(list, k, s, bodies, error)
       type(body_list_t), intent(in) :: list
@@ -223,13 +277,20 @@ contains
       real(wp), allocatable :: cleaned(:, :)
       character(len=:), allocatable :: problem
       real(wp) :: area, centroid(2), second_moment
+      integer(ip), allocatable :: number(:)
       integer(ip) :: v
 
       bodies%id(s) = list%id(list%body(k)%entry)
       bodies%fixed(s) = list%body(k)%fixed
-      call clean_polygon(list%polygons%polygon(k), cleaned, problem)
+      if (allocated(list%body(k)%first)) then
+         call join_pieces(list%polygons%polygon(k), list%body(k)%first, cleaned, number, area, centroid, &
+                          second_moment, problem)
+      else
+         call clean_polygon(list%polygons%polygon(k), cleaned, problem)
+         if (allocated(problem)) problem = 'the polygon '//problem
+      end if
       if (allocated(problem)) then
-         call raise(error, input_error, 'body '//to_text(bodies%id(s))//': the polygon '//problem)
+         call raise(error, input_error, 'body '//to_text(bodies%id(s))//': '//problem)
          return
       end if
       associate (given => list%body(k))
@@ -242,7 +303,7 @@ contains
                        'velocity or an angular velocity; set motion in &scene of the namelist to move it')
             return
          end if
-         call mass_properties(cleaned, area, centroid, second_moment)
+         if (.not. allocated(given%first)) call mass_properties(cleaned, area, centroid, second_moment)
          bodies%position(:, s) = centroid
          bodies%velocity(:, s) = given%velocity
          bodies%angular_velocity(s) = given%angular_velocity
@@ -259,6 +320,7 @@ contains
       call reserve_vertices(bodies, bodies%pieces%vertex_start(s), size(cleaned, 2, kind=ip))
       do v = 1_ip, size(cleaned, 2, kind=ip)
          bodies%pieces%vertex(:, bodies%pieces%vertex_start(s) + v - 1_ip) = cleaned(:, v) - centroid
+         if (allocated(number)) bodies%pieces%number(bodies%pieces%vertex_start(s) + v - 1_ip) = number(v)
       end do
       bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + size(cleaned, 2, kind=ip)
    end subroutine place
@@ -288,11 +350,16 @@ contains
       type(bodies_t), intent(inout) :: bodies
       integer(ip), intent(in) :: first, more
       real(wp), allocatable :: longer(:, :)
+      integer(ip), allocatable :: longer_number(:)
 
       if (first + more - 1_ip <= size(bodies%pieces%vertex, 2)) return
       allocate (longer(2, 2_ip*(first + more)))
       longer(:, 1:first - 1_ip) = bodies%pieces%vertex(:, 1:first - 1_ip)
       call move_alloc(longer, bodies%pieces%vertex)
+      if (.not. allocated(bodies%pieces%number)) return
+      allocate (longer_number(2_ip*(first + more)), source=0_ip)
+      longer_number(1:first - 1_ip) = bodies%pieces%number(1:first - 1_ip)
+      call move_alloc(longer_number, bodies%pieces%number)
    end subroutine reserve_vertices
 
    subroutine finish(bodies)
@@ -304,6 +371,8 @@ contains
       allocate (shape(2, n_vertices), bodies%pieces%turned(2, n_vertices))
       shape(:, :) = bodies%pieces%vertex(:, :n_vertices)
       call move_alloc(shape, bodies%pieces%vertex)
+      if (bodies%pieces%most > 1_ip) bodies%pieces%number = bodies%pieces%number(:n_vertices)
+      call bodies%pieces%find_pieces()
       call measure_bodies(bodies)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])

@@ -12,7 +12,8 @@ module polydem_contact_block
    use polydem_overlap_batch, only: lanes, overlap_columns_t
    implicit none
    private
-   public :: contact_block_t, block_size, load_block, store_forces, store_contact, copy_motion
+   public :: contact_block_t, block_size, load_block, store_forces, store_contact, copy_motion, &
+      is_exchanged
 
    !> Largest number of contacts in a block
    integer(ip), parameter :: block_size = lanes
@@ -28,6 +29,8 @@ module polydem_contact_block
       integer(ip) :: pair(block_size) = 0_ip
       !> Slots of the first and of the second body
       integer(ip) :: first(block_size) = 0_ip, second(block_size) = 0_ip
+      !> First and second piece; set only if bodies have several pieces, (contact, body)
+      integer(ip) :: piece(block_size, 2)
       !> Numbers of the materials of both bodies; set only if bodies have materials, (contact, body)
       integer(ip) :: material(block_size, 2)
       !> Rate of change of the area [m2/s]

@@ -1,6 +1,7 @@
 !> Ranges of consecutive pairs for threads.
 module polydem_pair_ranges
    use polydem_kinds, only: dp, ip
+   use polydem_pieces, only: pieces_t
    implicit none
    private
    public :: divide_pairs, balance_ranges, most_ranges
@@ -16,11 +17,13 @@ module polydem_pair_ranges
 contains
 
    !> Divide the pairs into ranges. All pairs with the same lower slot are in one range.
-   pure subroutine divide_pairs(n_pairs, first, n_ranges, upto, ends)
+   pure subroutine divide_pairs(n_pairs, first, pieces, n_ranges, upto, ends)
       !> Number of pairs
       integer(ip), intent(in) :: n_pairs
-      !> Lower slot of each pair, ascending, (n_pairs) or longer
+      !> Lower piece of each pair, ascending, (n_pairs) or longer
       integer(ip), intent(in) :: first(:)
+      !> Pieces of the bodies: a range ends with the last pair of a body
+      type(pieces_t), intent(in) :: pieces
       !> Largest number of ranges; afterwards the number of ranges, at least 1
       integer(ip), intent(inout) :: n_ranges
       !> Part of all pairs up to the end of each range, (0:n_ranges). Equal parts if it is not allocated or for another
@@ -42,7 +45,7 @@ contains
       do r = 1_ip, n_ranges - 1_ip
          p = max(ends(r - 1_ip), int(real(n_pairs, dp)*upto(r), ip))
          do while (p > 0_ip .and. p < n_pairs)
-            if (first(p) < first(p + 1_ip)) exit
+            if (pieces%body_of(first(p)) < pieces%body_of(first(p + 1_ip))) exit
             p = p + 1_ip
          end do
          ends(r) = p

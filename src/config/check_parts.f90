@@ -110,6 +110,10 @@ contains
          'must be ''rectangle'' with arrangement = ''column''', error)
       if (group%arrangement == 'column' .and. any(abs(group%angle) > 0.0_wp)) call blame(instance, 'angle', &
          'must be 0, 0 with arrangement = ''column''', error)
+      if (group%shape == 'cross' .and. (group%arm >= group%width .or. group%width > 1.0e6_wp*group%arm)) &
+         call blame(instance, 'arm', &
+         'must be less than ''width'', the distance of opposite ends, and not less than a millionth of it', error, &
+         'width')
       if (group%corners(1) > group%corners(2)) call blame(instance, 'corners', 'must be in ascending order: write '// &
          to_text(group%corners(2))//', '//to_text(group%corners(1)), error)
       if (group%long_axis(1) > group%long_axis(2)) call blame(instance, 'long_axis', &
@@ -122,7 +126,8 @@ contains
          'must not exceed the first value of ''long_axis''', error, 'long_axis')
       if (group%shape == 'ellipse' .and. group%long_axis(2) > 1.0e6_wp*group%short_axis) call blame(instance, &
          'long_axis', 'must not exceed 1e6 times ''short_axis''', error, 'short_axis')
-      if (max(group%width, group%height) > 1.0e6_wp*min(group%width, group%height)) call blame(instance, 'width', &
+      if (group%shape == 'rectangle' .and. max(group%width, group%height) > 1.0e6_wp*min(group%width, group%height)) &
+         call blame(instance, 'width', &
          'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
       if (group%moving_grains > group%number .and. group%number > 0_ip) call blame(instance, 'moving_grains', &
          'must not exceed ''number''', error, 'number')

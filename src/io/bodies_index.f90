@@ -12,8 +12,8 @@ module polydem_bodies_index
    public :: bodies_index_t, known_materials_t, read_index, read_materials, entry_text
 
    !> Data sets that a bodies file may have
-   character(len=*), parameter :: known_names(11) = [character(len=16) :: 'vertex', 'vertex_start', 'fixed', &
-      'velocity', 'angular_velocity', 'density', 'mass', 'inertia', 'id', 'material', 'material_names']
+   character(len=*), parameter :: known_names(12) = [character(len=16) :: 'vertex', 'vertex_start', 'fixed', &
+      'velocity', 'angular_velocity', 'density', 'mass', 'inertia', 'id', 'material', 'material_names', 'piece']
    !> Those that may be absent and have a number per body, or two
    character(len=*), parameter :: optional_columns(5) = known_names(4:8)
 
@@ -30,6 +30,8 @@ module polydem_bodies_index
       integer(ip), allocatable :: fixed(:)
       !> Identifiers, (body)
       integer(ip), allocatable :: id(:)
+      !> Number of the piece of each vertex within its body, from 0; not allocated if every body has one piece, (vertex)
+      integer(ip), allocatable :: piece(:)
       !> Numbers of the materials of the run, (body)
       integer(ip), allocatable :: material(:)
    end type bodies_index_t
@@ -63,6 +65,7 @@ contains
       if (allocated(error)) return
       table%n = size(table%vertex_start, kind=ip) - 1_ip
       call check_starts(file, table, n_vertices, error)
+      call read_pieces(file, table, error)
       call read_flags(file, table, error)
       call read_identifiers(file, table, error)
       do k = 1, size(optional_columns)
@@ -186,6 +189,39 @@ contains
       end if
       if (.not. allocated(error)) call check_length(file, name, n_rows, n, error)
    end subroutine check_rows
+
+   !> Read the numbers of pieces. Within each body they begin with 0 and ascend by steps of 1.
+   subroutine read_pieces(file, table, error)
+      type(hdf5_file_t), intent(in) :: file
+      type(bodies_index_t), intent(inout) :: table
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k, v, before
+
+      if (allocated(error)) return
+      if (.not. file%has('piece', error)) return
+      call file%read('piece', table%piece, error)
+      if (allocated(error)) return
+      associate (n => table%vertex_start(table%n + 1_ip))
+         if (size(table%piece) /= n) then
+            call file%reject('piece has '//to_text(size(table%piece))//' rows, but vertex has '//to_text(n), error)
+            return
+         end if
+      end associate
+      do k = 1_ip, table%n
+         before = 0_ip
+         do v = table%vertex_start(k) + 1_ip, table%vertex_start(k + 1_ip)
+            if (v == table%vertex_start(k) + 1_ip .and. table%piece(v) == 0_ip) cycle
+            if (v > table%vertex_start(k) + 1_ip .and. any(table%piece(v) == [before, before + 1_ip])) then
+               before = table%piece(v)
+               cycle
+            end if
+            call file%reject(entry_text('piece', v)//' of body '//to_text(k - 1_ip)//', counted from 0, is '// &
+                             to_text(table%piece(v))//'; the pieces of each body are counted from 0 by steps of 1', &
+                             error)
+            return
+         end do
+      end do
+   end subroutine read_pieces
 
    !> Read the flags of fixed bodies.
    subroutine read_flags(file, table, error)

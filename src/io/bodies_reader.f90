@@ -4,6 +4,8 @@
 !>
 !>     vertex            (nv, 2)  vertices in world coordinates, body after body [m]
 !>     vertex_start      (n + 1)  first vertex of each body, counted from 0; the last entry is nv
+!>     piece             (nv)     optional: number of the piece of each vertex within its body, from 0; the vertices of
+!>                                a body of several convex pieces are those of its pieces, one after the other
 !>     fixed             (n)      1 for a fixed body, 0 for a free one
 !>     velocity          (n, 2)   optional, of the centre of mass [m/s]
 !>     angular_velocity  (n)      optional [rad/s]
@@ -172,9 +174,21 @@ contains
                           id=table%id(s), &
                           mass=real(block%mass(k), wp), &
                           inertia=real(block%inertia(k), wp), &
-                          material=material)
+                          material=material, &
+                          piece=pieces_of(table, s))
       end do
    end subroutine list_block
+
+   !> Numbers of the pieces of the vertices of a body
+   pure function pieces_of(table, s) result(piece)
+      type(bodies_index_t), intent(in) :: table
+      !> Number of the body
+      integer(ip), intent(in) :: s
+      integer(ip) :: piece(table%vertex_start(s + 1_ip) - table%vertex_start(s))
+
+      piece = 0_ip
+      if (allocated(table%piece)) piece = table%piece(table%vertex_start(s) + 1_ip:table%vertex_start(s + 1_ip))
+   end function pieces_of
 
    !> Read the velocities of a block; default: zero.
    subroutine read_velocity(file, rows, velocity, error)

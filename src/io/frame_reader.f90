@@ -64,7 +64,7 @@ contains
       !> Names the file and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      integer(ip), allocatable :: id(:), fixed(:), start(:), material(:)
+      integer(ip), allocatable :: id(:), fixed(:), start(:), material(:), piece(:)
       real(dp), allocatable :: shape(:, :), mass(:), inertia(:)
       real(wp), allocatable :: corners(:, :)
       type(frame_columns_t) :: frame
@@ -77,6 +77,7 @@ contains
       call file%read('/bodies/fixed', fixed, error)
       call file%read('/bodies/vertex_start', start, error)
       call file%read('/bodies/vertex', shape, error)
+      if (file%has('/bodies/piece', error)) call file%read('/bodies/piece', piece, error)
       call file%read('/bodies/mass', mass, error)
       call file%read('/bodies/inertia', inertia, error)
       if (list%has_materials) call file%read('/bodies/material', material, error)
@@ -84,6 +85,7 @@ contains
       call file%close(error)
       if (allocated(error)) return
       if (.not. allocated(material)) material = spread(0_ip, 1, size(id))
+      if (.not. allocated(piece)) piece = spread(0_ip, 1, size(shape, 2))
       if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1] /= size(id))) then
          call raise(error, input_error, path//': its data sets have different numbers of bodies')
          return
@@ -98,11 +100,12 @@ contains
          end do
          if (fixed(k) == 1_ip) then
             call list%append(corners, fixed=.true., id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp), &
-                             material=material(k))
+                             material=material(k), piece=piece(start(k) + 1_ip:start(k + 1_ip)))
          else
             call list%append(corners, velocity=real(frame%velocity(:, j), wp), &
                              angular_velocity=real(frame%spin(j), wp), id=id(k), mass=real(mass(k), wp), &
-                             inertia=real(inertia(k), wp), material=material(k))
+                             inertia=real(inertia(k), wp), material=material(k), &
+                             piece=piece(start(k) + 1_ip:start(k + 1_ip)))
          end if
       end do
    end subroutine list_frame

@@ -1,6 +1,7 @@
 !> One segment of a trajectory: a self-describing HDF5 file.
 !>
 !>     /bodies      id, fixed, mass, inertia, vertex_start, vertex: the bodies, in ascending order of identifiers
+!>                  piece (if bodies have several pieces): number of the piece of each vertex within its body, from 0
 !>     /cell        low, size: periodic cell (in a periodic cell)
 !>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
 !>                  image (in a periodic cell), slid and shift (in a sheared cell)
@@ -123,9 +124,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(row_distribution_t) :: blocks
       integer(ip), allocatable :: start(:)
+      integer(lp), allocatable :: pieces(:, :)
       real(dp), allocatable :: vertices(:, :)
       character(len=*), parameter :: about_start = &
          'body k owns the rows vertex_start[k] to vertex_start[k + 1] - 1 of vertex', &
+         about_piece = 'number of the piece of each vertex within its body, from 0', &
          about_vertex = 'vertices relative to the centre of mass at angle 0, anticlockwise'
       integer(ip) :: k, n
 
@@ -139,11 +142,17 @@ contains
                                part_t(int(k, lp) - 1_lp, int(n, lp)))
             end associate
          end do
+         if (bodies%pieces%most > 1_ip) call file%write('/bodies/piece', bodies%pieces%number, error, '1', about_piece)
          return
       end if
       allocate (start(size(n_vertices) + 1))
       call order_vertices(comm, bodies, blocks)
       call blocks%to_blocks(comm, real(bodies%pieces%vertex(:, :n), dp), vertices)
+      if (bodies%pieces%most > 1_ip) then
+         call blocks%to_blocks(comm, reshape(int(bodies%pieces%number, lp), [1_ip, n]), pieces)
+         call file%write('/bodies/piece', int(pieces(1, :), ip), error, '1', about_piece, &
+                         part_t(blocks%first, blocks%total))
+      end if
       start(1) = int(blocks%first, ip)
       do k = 1_ip, size(n_vertices, kind=ip)
          start(k + 1) = start(k) + n_vertices(k)

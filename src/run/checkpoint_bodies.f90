@@ -9,7 +9,6 @@ module polydem_checkpoint_bodies
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: far, ip, lp, wp
-   use polydem_polygon, only: signed_area
    use polydem_serializer, only: serializer_t
    use polydem_strings, only: to_text
    implicit none
@@ -66,7 +65,7 @@ contains
       !> On entry the bodies of the scene, on return those of the checkpoint
       type(bodies_t), intent(inout) :: bodies
       type(taken_t) :: taken
-      integer(ip) :: k, last_id(1)
+      integer(ip) :: k, last_id(1), most_pieces
       integer :: isa
       logical :: has_materials
       type(cell_t) :: cell
@@ -78,7 +77,8 @@ contains
       isa = bodies%isa
       has_materials = allocated(bodies%material)
       cell = bodies%cell
-      call allocate_with_corners(bodies, taken%corners)
+      most_pieces = bodies%pieces%most
+      call allocate_with_corners(bodies, taken%corners, most_pieces)
       if (has_materials) allocate (bodies%material(bodies%n))
       bodies%n_all = taken%n_all
       bodies%last_id = max(last_id(1), taken%last_id)
@@ -91,6 +91,8 @@ contains
       call serialize_vertices(serializer, bodies)
       call serialize_bodies(serializer, bodies)
       bodies%free = pack([(k, k=1_ip, bodies%n)],.not. bodies%fixed)
+      if (.not. allocated(serializer%error)) call check_numbers(bodies, serializer%error)
+      if (.not. allocated(serializer%error)) call bodies%pieces%find_pieces()
       call check_bodies(bodies, serializer%error)
       if (.not. allocated(serializer%error)) call measure_bodies(bodies)
    end subroutine read_bodies
@@ -166,6 +168,27 @@ contains
       rows = [rows, more]
    end subroutine append_vertices
 
+   !> Check the numbers of pieces, which other programs may have changed.
+   subroutine check_numbers(bodies, error)
+      type(bodies_t), intent(in) :: bodies
+      !> Names the body
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: s
+
+      if (bodies%pieces%most == 1_ip) return
+      do s = 1_ip, bodies%n
+         associate (number => bodies%pieces%number(bodies%pieces%vertex_start(s):bodies%pieces%vertex_start(s + 1_ip) &
+                                                                                 - 1_ip))
+            associate (n => size(number))
+               if (number(1) == 0_ip .and. number(n) < bodies%pieces%most &
+                   .and. all(number(2:) == number(:n - 1) .or. number(2:) == number(:n - 1) + 1_ip)) cycle
+            end associate
+         end associate
+         call raise(error, input_error, 'body '//to_text(bodies%id(s))//': /vertices/piece does not count its pieces')
+         return
+      end do
+   end subroutine check_numbers
+
    !> Check masses and vertices, which other programs may have changed.
    subroutine check_bodies(bodies, error)
       type(bodies_t), intent(in) :: bodies
@@ -180,7 +203,7 @@ contains
          associate (polygon => bodies%pieces%polygon(s))
             if (.not. all(abs(polygon) <= far)) then
                call raise(error, input_error, 'body '//to_text(bodies%id(s))//': a vertex is too far away')
-            else if (.not. signed_area(polygon) > 0.0_wp) then
+            else if (.not. bodies%pieces%area_of(s) > 0.0_wp) then
                call raise(error, input_error, 'body '//to_text(bodies%id(s))//': the polygon has no area')
             end if
          end associate

@@ -8,6 +8,7 @@
 module polydem_checkpoint_fields
    use polydem_balance_state, only: serialize_balance, serialize_contributions
    use polydem_begin_stage, only: continue_stages
+   use polydem_bodies, only: piece_identifiers
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_errors, only: error_t, input_error, raise
@@ -146,7 +147,7 @@ contains
       type(packed_history_t) :: packed
 
       associate (pairs => s%neighbours%pairs)
-         call pack_pairs(pairs%n, pairs%first, pairs%second, s%bodies%id, s%history, packed)
+         call pack_pairs(pairs%n, pairs%first, pairs%second, piece_identifiers(s%bodies), s%history, packed)
       end associate
       call serialize_pairs(serializer, s%history, packed)
    end subroutine save_pairs
@@ -158,10 +159,11 @@ contains
       !> The simulation, which receives the history
       type(simulation_t), intent(inout) :: s
       type(packed_history_t) :: part
-      integer(ip), allocatable :: owned(:)
+      integer(ip), allocatable :: id(:), owned(:)
       integer(lp) :: first, n
       integer(ip) :: k
 
+      id = piece_identifiers(s%bodies)
       call serializer%count_rows('/pairs/first', n)
       if (allocated(s%received_history)) deallocate (s%received_history)
       allocate (s%received_history)
@@ -186,7 +188,7 @@ contains
          integer(lp), intent(in) :: key
          integer(ip) :: slots(2)
 
-         slots = slots_of_pair(s%bodies%id, key)
+         slots = s%bodies%pieces%bodies_of(slots_of_pair(id, key))
          has_body = any(slots > 0_ip)
          if (slots(1) > 0_ip) has_body = .not. s%bodies%in_halo(slots(1)) .and. .not. s%bodies%fixed(slots(1))
          if (.not. has_body .and. slots(2) > 0_ip) &
@@ -207,10 +209,10 @@ contains
       integer :: k
 
       ids = shiftr(packed%key, 32)
-      call serializer%field('/pairs/first', ids, '1', 'lower identifier of each pair')
+      call serializer%field('/pairs/first', ids, '1', 'lower identifier of each pair of pieces')
       if (serializer%is_reading) packed%key = shiftl(ids, 32)
       ids = iand(packed%key, int(huge(1_ip), lp))
-      call serializer%field('/pairs/second', ids, '1', 'higher identifier of each pair')
+      call serializer%field('/pairs/second', ids, '1', 'higher identifier of each pair of pieces')
       if (serializer%is_reading) packed%key = ior(packed%key, iand(ids, int(huge(1_ip), lp)))
       if (.not. allocated(history%column)) return
       do k = 1, size(history%column)
@@ -241,11 +243,13 @@ contains
       type(simulation_t), intent(in) :: s
       type(packed_history_t), intent(in) :: packed
       type(error_t), allocatable, intent(inout) :: error
+      integer(ip), allocatable :: id(:)
       integer(ip) :: k, slots(2)
       logical :: is_known
 
+      id = piece_identifiers(s%bodies)
       do k = 1_ip, size(packed%key, kind=ip)
-         slots = slots_of_pair(s%bodies%id, packed%key(k))
+         slots = slots_of_pair(id, packed%key(k))
          is_known = all(slots > 0_ip) .or. s%bodies%n < s%bodies%n_all
          if (k > 1_ip) is_known = is_known .and. packed%key(k) > packed%key(k - 1_ip)
          if (.not. is_known) then

@@ -11,7 +11,7 @@ module polydem_checkpoint_schedule
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_monitor, only: monitor_t
-   use polydem_ownership, only: order_bodies, order_pairs, order_vertices
+   use polydem_ownership, only: order_bodies, order_pieces, order_vertices
    use polydem_provenance, only: provenance_t
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_settings, only: checkpoint_settings_t
@@ -174,7 +174,7 @@ contains
          call file%set_rows('/pieces/', rows)
          call order_vertices(comm, bodies, rows)
          call file%set_rows('/vertices/', rows)
-         call order_pairs(comm, bodies, pairs%first(:pairs%n), pairs%second(:pairs%n), rows)
+         call order_pieces(comm, bodies, pairs%first(:pairs%n), pairs%second(:pairs%n), rows)
          call file%set_rows('/pairs/', rows)
       end associate
    end subroutine lay_out_rows

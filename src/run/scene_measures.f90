@@ -270,9 +270,7 @@ contains
       measures%density(1) = huge(1.0_wp)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
-         associate (shape => bodies%pieces%polygon(s))
-            density = bodies%mass(s)/area_of(shape)
-         end associate
+         density = bodies%mass(s)/bodies%pieces%area_of(s)
          speed = hypotenuse(bodies%velocity(1, s), bodies%velocity(2, s))
          measures%diameter([1, 3]) = [min(measures%diameter(1), bodies%diameter(s)), &
                                        max(measures%diameter(3), bodies%diameter(s))]
@@ -297,18 +295,5 @@ contains
       call sum_exactly(comm, kinetic, measures%kinetic)
       call keep_greatest(comm, measures%impact, measures%fastest)
    end subroutine measure_free_bodies
-
-   !> Area of a polygon [m2]
-   pure real(wp) function area_of(shape)
-      real(wp), intent(in) :: shape(:, :)
-      integer :: v, w
-
-      area_of = 0.0_wp
-      w = size(shape, 2)
-      do v = 1, size(shape, 2)
-         area_of = area_of + 0.5_wp*(shape(1, w)*shape(2, v) - shape(2, w)*shape(1, v))
-         w = v
-      end do
-   end function area_of
 
 end module polydem_scene_measures

@@ -132,6 +132,11 @@ contains
       associate (i => block%first(c), j => block%second(c))
          passes = block%area(c) > least_depth*block%length(c)*min(bodies%thickness(i), bodies%thickness(j))
          if (.not. passes .or. reversed) return
+         if (bodies%pieces%most > 1_ip) then
+            passes = piece_inside(bodies, i, j, block%piece(c, 1), block%piece(c, 2)) &
+                     .or. piece_inside(bodies, j, i, block%piece(c, 2), block%piece(c, 1))
+            return
+         end if
          passes = centre_inside(bodies, bodies%radius, i, j)
          if (.not. passes) passes = centre_inside(bodies, bodies%radius, j, i)
       end associate
@@ -152,7 +157,12 @@ contains
       character(len=:), allocatable :: text
 
       associate (i => contacts%first(c), j => contacts%second(c))
-         if (centre_inside(bodies, radius, i, j)) then
+         if (bodies%pieces%most > 1_ip) then
+            text = 'of the contact of the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
+               to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
+               to_text(bodies%position(2, i) + contacts%arm_first(2, c))// &
+               ') m a piece has its centre inside the other, or the direction changed by more than 90 degrees'
+         else if (centre_inside(bodies, radius, i, j)) then
             text = centre_text(i, j)
          else if (centre_inside(bodies, radius, j, i)) then
             text = centre_text(j, i)
@@ -177,6 +187,30 @@ contains
       end function centre_text
 
    end function passing_text
+
+   !> Whether the centre of a piece is inside a piece of another body
+   pure logical function piece_inside(bodies, s, other, piece, of_other) result(inside)
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the body and of the other body, and their pieces
+      integer(ip), intent(in) :: s, other, piece, of_other
+      real(wp) :: place(2), edge(2)
+      integer(ip) :: v, w
+
+      place = bodies%position(:, s) - bodies%position(:, other)
+      if (bodies%cell%is_periodic) &
+         place = nearest_copy(bodies%cell, min(bodies%folds(:, s), bodies%folds(:, other)), place)
+      associate (pieces => bodies%pieces)
+         place = place + (pieces%arm(:, piece) - pieces%arm(:, of_other))
+         inside = .true.
+         w = pieces%start(of_other + 1_ip) - 1_ip
+         do v = pieces%start(of_other), pieces%start(of_other + 1_ip) - 1_ip
+            edge = pieces%outline(:, v) - pieces%outline(:, w)
+            inside = inside .and. edge(1)*(place(2) - pieces%outline(2, w)) &
+               - edge(2)*(place(1) - pieces%outline(1, w)) > 0.0_wp
+            w = v
+         end do
+      end associate
+   end function piece_inside
 
    !> Whether the centre of a body is inside another body
    pure logical function centre_inside(bodies, radius, s, other)

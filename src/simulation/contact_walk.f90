@@ -48,11 +48,11 @@ contains
       self%walk%has_table = tabulate
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
-         call divide_pairs(pairs%n, pairs%first, n, self%walk%upto, ends)
+         call divide_pairs(pairs%n, pairs%first, self%bodies%pieces, n, self%walk%upto, ends)
          call reserve_ranges(n, self%walk)
          last(0) = 0_ip
          do r = 1_ip, n - 1_ip
-            last(r) = pairs%first(ends(r))
+            last(r) = self%bodies%pieces%body_of(pairs%first(ends(r)))
          end do
          last(n) = self%bodies%n
       end associate

@@ -53,7 +53,7 @@ contains
       class(free_flight_t), intent(inout) :: self
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      !> Whether forces act on bodies that are no contacts
+      !> Whether forces act on bodies that are no contacts, or bodies have several pieces, of which pairs are made
       logical, intent(in) :: has_fields
       class(integrator_t), intent(in) :: integrator
       !> Number of bodies

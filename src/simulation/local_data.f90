@@ -47,8 +47,8 @@ contains
       call start_sums(self%bodies%n, self%force_sums)
       ! The border of a sheared cell acts on bodies that nothing touches.
       call self%flight%start(self%settings%forces%gravity, &
-                             allocated(self%body_forces%list) .or. self%bodies%cell%is_sheared, self%integrator, &
-                             self%bodies%n)
+                             allocated(self%body_forces%list) .or. self%bodies%cell%is_sheared .or. &
+                             self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
       self%walk%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)

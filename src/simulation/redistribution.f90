@@ -5,7 +5,7 @@
 !> ascending order of global index. The pair list is rebuilt from scratch, and the contact history of the pairs is
 !> restored. At the start of a run the bodies of a rank are anywhere; the first redistribution gives each rank its own.
 module polydem_redistribution
-   use polydem_bodies, only: turn_bodies
+   use polydem_bodies, only: piece_identifiers, turn_bodies
    use polydem_boxes_within, only: have_boxes_within
    use polydem_errors, only: error_t
    use polydem_motion_check, only: greatest_displacement
@@ -112,8 +112,8 @@ contains
 
       if (.not. allocated(self%received_history)) return
       associate (pairs => self%neighbours%pairs)
-         call receive_pairs(self%received_history, pairs%n, pairs%first, pairs%second, self%bodies%id, self%history, &
-                            n_known)
+         call receive_pairs(self%received_history, pairs%n, pairs%first, pairs%second, &
+                            piece_identifiers(self%bodies), self%history, n_known)
          pairs%n_began = pairs%n_began - n_known
          pairs%n_ended = pairs%n_ended + size(self%received_history%key, kind=ip) - n_known
       end associate
@@ -160,20 +160,21 @@ contains
    subroutine send_history(self, owner)
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: owner(:)
-      integer(ip), allocatable :: slots(:, :)
+      integer(ip), allocatable :: slots(:, :), id(:)
       integer(ip) :: p
 
       associate (pairs => self%neighbours%pairs, bodies => self%bodies)
+         id = piece_identifiers(bodies)
          if (allocated(self%received_history)) then
             allocate (slots(2, size(self%received_history%key)))
             do p = 1_ip, size(slots, 2, kind=ip)
-               slots(:, p) = slots_of_pair(bodies%id, self%received_history%key(p))
+               slots(:, p) = bodies%pieces%bodies_of(slots_of_pair(id, self%received_history%key(p)))
             end do
          else
             allocate (self%received_history, slots(2, pairs%n))
-            call pack_pairs(pairs%n, pairs%first, pairs%second, bodies%id, self%history, self%received_history)
-            slots(1, :) = pairs%first(:pairs%n)
-            slots(2, :) = pairs%second(:pairs%n)
+            call pack_pairs(pairs%n, pairs%first, pairs%second, id, self%history, self%received_history)
+            slots(1, :) = bodies%pieces%bodies_of(pairs%first(:pairs%n))
+            slots(2, :) = bodies%pieces%bodies_of(pairs%second(:pairs%n))
          end if
          call send_pairs(self%comm, slots, merge(-1_ip, owner, bodies%in_halo), self%received_history)
       end associate

@@ -7,7 +7,7 @@
 !> Slots and global indices change; identifiers do not, and none is used twice. The caller tells the energy balance what
 !> the bodies bring and take (`polydem_changed_bodies`); the channels of new bodies begin as at time 0.
 module polydem_replace_bodies
-   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_bodies, only: bodies_t, piece_identifiers, turn_bodies
    use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_changed_bodies, only: start_entering
@@ -62,6 +62,7 @@ contains
       if (added%n_all > 0_ip) then
          if (allocated(self%bodies%material) .and. .not. allocated(added%material)) &
             allocate (added%material(added%n), source=0_ip)
+         call give_most(added, self%bodies%pieces%most)
          call start_added(self, added, entering)
          call set_cell(added, self%bodies%cell)
          slots = [(s, s=1_ip, added%n)]
@@ -83,6 +84,18 @@ contains
       end if
       call settle_bodies(self, error)
    end subroutine replace_bodies
+
+   !> Make the pieces of new bodies like those of the run, whose bodies have up to `most` pieces.
+   subroutine give_most(added, most)
+      type(bodies_t), intent(inout) :: added
+      integer(ip), intent(in) :: most
+
+      added%pieces%most = max(added%pieces%most, most)
+      if (added%pieces%most == 1_ip) return
+      if (.not. allocated(added%pieces%number)) &
+         allocate (added%pieces%number(size(added%pieces%vertex, 2)), source=0_ip)
+      call added%pieces%find_pieces()
+   end subroutine give_most
 
    !> Build anew what depends on the bodies, after their set has changed or a checkpoint was read: boxes, guards, an
    !> empty list of pairs. The ranks forget their halos. Collective; all ranks get the same error.
@@ -124,7 +137,8 @@ contains
       if (allocated(self%received_history)) return
       allocate (self%received_history)
       associate (pairs => self%neighbours%pairs)
-         call pack_pairs(pairs%n, pairs%first, pairs%second, self%bodies%id, self%history, self%received_history)
+         call pack_pairs(pairs%n, pairs%first, pairs%second, piece_identifiers(self%bodies), self%history, &
+                         self%received_history)
       end associate
    end subroutine hold_history
 

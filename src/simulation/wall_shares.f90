@@ -21,6 +21,7 @@ module polydem_wall_shares
    use polydem_grow, only: grow
    use polydem_kinds, only: ip, min_parallel_size, wp
    use polydem_pair_list, only: pair_list_t
+   use polydem_pieces, only: pieces_t
    implicit none
    private
    public :: wall_shares_t, find_shares, set_shares
@@ -88,6 +89,10 @@ contains
          if (bodies%fixed(to)) exit
          to = to - 1_ip
       end do
+      if (bodies%pieces%most > 1_ip) then
+         from = bodies%pieces%first(from)
+         to = bodies%pieces%first(to + 1_ip) - 1_ip
+      end if
       do p = 1_ip, pairs%n, block_size
          n = 0_ip
          do k = p, min(pairs%n, p + block_size - 1_ip)
@@ -95,14 +100,15 @@ contains
             n = n + merge(1_ip, 0_ip, (pairs%second(k) >= from .and. pairs%second(k) <= to) .or. &
                           (pairs%first(k) >= from .and. pairs%first(k) <= to))
          end do
-         if (n > 0_ip) call append(bodies%fixed, pairs, found(:n), shares)
+         if (n > 0_ip) call append(bodies%fixed, bodies%pieces, pairs, found(:n), shares)
       end do
       call keep_several(shares)
    end subroutine list_pairs
 
    !> Append those of some pairs that have one fixed body.
-   subroutine append(fixed, pairs, found, shares)
+   subroutine append(fixed, pieces, pairs, found, shares)
       logical, intent(in), contiguous :: fixed(:)
+      type(pieces_t), intent(in) :: pieces
       type(pair_list_t), intent(in) :: pairs
       !> Indices of pairs, ascending
       integer(ip), intent(in) :: found(:)
@@ -111,7 +117,7 @@ contains
 
       call reserve_pairs(shares%n + size(found, kind=ip), shares)
       do k = 1_ip, size(found, kind=ip)
-         associate (i => pairs%first(found(k)), j => pairs%second(found(k)))
+         associate (i => pieces%body_of(pairs%first(found(k))), j => pieces%body_of(pairs%second(found(k))))
             if (fixed(i) .eqv. fixed(j)) cycle
             shares%n = shares%n + 1_ip
             shares%pair(shares%n) = found(k)

@@ -12,7 +12,6 @@ module polydem_quantities
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_pair
-   use polydem_polygon, only: signed_area
    use polydem_sample_area, only: sample_area_t
    use polydem_simulation, only: simulation_t
    implicit none
@@ -130,7 +129,7 @@ contains
       associate (bodies => simulation%bodies)
          do k = 1_ip, size(bodies%free, kind=ip)
             if (is_inside(bodies%position(:, bodies%free(k)), area%low, area%high)) &
-               call sums(1)%add(signed_area(bodies%pieces%polygon(bodies%free(k))))
+               call sums(1)%add(bodies%pieces%area_of(bodies%free(k)))
          end do
       end associate
       call all_reduce_exact_sums(simulation%comm, sums)
@@ -213,7 +212,7 @@ contains
                if (.not. is_inside(bodies%position(:, s), area%low, area%high)) cycle
                x = merge(0.0_wp, bodies%position(:, s) - origin, cell%size > 0.0_wp)
                v = bodies%velocity(:, s)
-               total = [1.0_wp, signed_area(bodies%pieces%polygon(s)), bodies%mass(s), x, v, &
+               total = [1.0_wp, bodies%pieces%area_of(s), bodies%mass(s), x, v, &
                         x(1)*x(1), x(1)*x(2), x(2)*x(2), x(1)*v(1), x(1)*v(2), x(2)*v(1), x(2)*v(2)]
             end associate
             do i = 1, size(sums)

@@ -58,6 +58,7 @@ PARTS = {
     "arrangement": {"loose": {}, "spread": {}, "row": {}, "random": {}, "single": {"region": "at"},
                     "column": {"region": "at", "shape": "rectangle"}, "packing": {"packing": "'none'"}},
     "shape": {"ellipse": {}, "regular": {"diameter": "8e-3, 9e-3"}, "rectangle": {"width": "9e-3", "height": "4e-3"},
+              "cross": {"width": "9e-3", "arm": "3e-3"},
               "outline": {"outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3"}},
     "sizes": {"uniform": {}, "octaves": {"size_ratio": "2"}}, "momentum": {"random": {}, "zero": {}},
 }

@@ -106,7 +106,7 @@ VARIED = {
     "grains.one.at": "0.01, 0", "grains.one.number": "30", "grains.one.number@at": None,
     "grains.one.solid_fraction": "0.2", "grains.one.packing": None, "grains.one.corners": "5, 9",
     "grains.one.short_axis": "7e-3", "grains.one.long_axis": "9e-3, 12e-3", "grains.one.diameter": "8e-3, 9e-3",
-    "grains.one.width": "6e-3", "grains.one.height": "4e-3",
+    "grains.one.width": "6e-3", "grains.one.height": "4e-3", "grains.one.arm": "2e-3",
     "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",

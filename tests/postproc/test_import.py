@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import Frame, ResultError
 from polydem_post.base.convex import concave_vertices, decompose
 from polydem_post.base.polygons import area_of, join, moments
-from polydem_post.bodies_file import ConcaveOutline, import_bodies, import_shapely, origin_of, write_bodies
+from polydem_post.bodies_file import import_bodies, import_shapely, origin_of, write_bodies
 from polydem_post.command_line.main import main
 from polydem_post.read.trajectory import Trajectory
 
@@ -193,12 +193,12 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     path, output = tmp_path / "l.wkt", tmp_path / "out.h5"
     path.write_text(f"{wkt(SQUARE)}\n{wkt(L_SHAPE)}\n")
     assert main(["import", str(path), "-o", str(output)]) == 2
-    assert f"{path}:2: the outline cannot be a body: it is concave at the vertex (1, 1); --decompose makes several " \
-        "separate bodies of it, which can move apart" in capsys.readouterr().err
+    assert f"{path}:2: the outline cannot be a body: it is concave at the vertex (1, 1); --decompose makes a body " \
+        "of several convex pieces of it" in capsys.readouterr().err
     assert not output.exists()
-    with pytest.warns(ConcaveOutline, match=r"l.wkt:2: the outline is concave and becomes 2 separate bodies"):
-        assert import_bodies(path, output, decomposed=True, fixed=[2]) == 3
-    assert_array_equal(contents(output)["fixed"], [0, 1, 1])
+    assert import_bodies(path, output, decomposed=True, fixed=[2]) == 2
+    assert_array_equal(contents(output)["fixed"], [0, 1])
+    assert_array_equal(contents(output)["piece"], [0] * 4 + [0] * 4 + [1] * 4)
 
 
 # A square with a vertex on an edge, turned in single precision; the like in Lambert 93 coordinates; a closing vertex

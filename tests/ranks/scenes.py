@@ -48,6 +48,16 @@ SCENES = {
 &forces gravity = 0, -40 stiffness = 1e6 drag = 2 /
 &integrate duration = 0.01 /
 """,
+    # Crosses of three pieces and pebbles of one in a ring that turns; both laws of history: friction and dashpots.
+    "pieces": """\
+&wall name = 'drum' outline = 'ring' radius = 0.1 segments = 30 thickness = 0.01 /
+&grains name = 'crosses' region = 'inside' wall = 'drum' number = 70 arrangement = 'random' speed = 1 spin = 20
+   shape = 'cross' width = 0.014 arm = 0.004 angle = 0, 360 /
+&grains name = 'pebbles' region = 'inside' wall = 'drum' number = 30 speed = 1 /
+&motion name = 'turn' kind = 'rotation' rate = 2.0 wall = 'drum' /
+&forces gravity = 0, -40 stiffness = 1e6 damping_from_touch = .false. /
+&integrate duration = 0.02 /
+""",
     # Grains of two materials, of which one is softer and lighter, between walls of a third one, and a pair of its own.
     "materials": """\
 &scene wall_material = 'steel' /

@@ -25,12 +25,12 @@ from scenes import SCENES, write_scene
 RANKS = (1, 2, 3, 4, 7)
 THREADS = (1, 2)
 #: How often bodies are handed out anew at least; grains in a stack hardly move
-LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "materials": 100, "cell": 100,
-                     "shear": 100, "chute": 100, "stages": 30, "walls": 100, "flow": 50, "stack": 1}
+LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "pieces": 100, "materials": 100,
+                     "cell": 100, "shear": 100, "chute": 100, "stages": 30, "walls": 100, "flow": 50, "stack": 1}
 #: Numbers of ranks that are tried unless all are
 QUICK_RANKS = {"drum": (2, 4, 3), "gas": (1, 3, 7), "hopper": (2, 3, 4), "bed": (1, 4, 2), "parts": (1, 2, 7),
-               "materials": (1, 3, 4), "cell": (1, 3, 7), "shear": (2, 3, 7), "chute": (2, 1, 7), "stages": (1, 2, 3),
-               "walls": (2, 3, 4), "flow": (2, 3, 7), "stack": (2, 3, 7)}
+               "pieces": (2, 3, 7), "materials": (1, 3, 4), "cell": (1, 3, 7), "shear": (2, 3, 7),
+               "chute": (2, 1, 7), "stages": (1, 2, 3), "walls": (2, 3, 4), "flow": (2, 3, 7), "stack": (2, 3, 7)}
 #: What is tried unless all is: every scene on several numbers of ranks, every finder and number of threads somewhere
 QUICK = [(scene, ranks, 1 + (ranks + k) % 2, FINDERS[(3 * k + n) % len(FINDERS)])
          for k, scene in enumerate(SCENES) for n, ranks in enumerate(QUICK_RANKS[scene])]

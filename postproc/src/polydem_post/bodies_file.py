@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 
 from .base.convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .base.new_file import NewHdf5, new_file
-from .base.polygons import FloatArray, join
+from .base.polygons import FloatArray, IntArray, join
 from .base.result_file import ResultError, cannot_read, cannot_write
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 
@@ -34,18 +33,14 @@ MEANINGS = {"fixed": "true or false", "id": "a whole number from 0 to 2147483647
 INFINITE = {"mass": 0.0, "inertia": 0.0, "density": 2500.0}
 
 
-class ConcaveOutline(UserWarning):
-    """A concave outline became several bodies, which can move apart."""
-
-
 def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], *, form: str = "", scale: float = 1.0,
                   fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False,
                   origin: Origin = None) -> int:
     """Make a bodies file of the polygons of a file (WKT, GeoJSON, plain text); return the number of bodies.
 
     Coordinates are multiplied by `scale` to give metres, then `origin` is subtracted as in `write_bodies`. `fixed` are
-    numbers of outlines in the file, from 1. A concave outline is an error, or with `decomposed` becomes several bodies
-    with a warning.
+    numbers of outlines in the file, from 1. A concave outline is an error, or with `decomposed` becomes a body of
+    several convex pieces.
     """
     if Path(output).exists() and Path(output).samefile(path):
         raise ResultError(f"{output}: is the file that is imported; choose another name")
@@ -128,19 +123,22 @@ def _save(path: Path, outlines: list[Outline], scale: float, shift: FloatArray, 
           origin: FloatArray | None, overwrite: bool) -> int:
     """Write outlines, or their convex pieces, with their properties; return the number of bodies."""
     polygons: list[FloatArray] = []
+    numbers: list[IntArray] = []
     rows: list[dict[str, Any]] = []
     places: list[str] = []
     for outline in outlines:
         parts = _pieces(outline, scale, shift, decomposed)
-        if len(parts) > 1 and {"mass", "inertia", "id"} & set(outline.properties):
-            raise ResultError(f"{outline.place}: a mass, an inertia or an id cannot be divided among its pieces")
-        polygons += parts
-        rows += [outline.properties] * len(parts)
-        places += [outline.place] * len(parts)
+        polygons.append(np.concatenate(parts))
+        numbers.append(np.repeat(np.arange(len(parts)), [len(part) for part in parts]))
+        rows.append(outline.properties)
+        places.append(outline.place)
     if not polygons:
         raise ResultError(f"{path}: there are no bodies to write")
     columns = {name: _column(name, rows, places) for name in PROPERTIES if any(name in row for row in rows)}
     columns.setdefault("fixed", np.zeros(len(rows), dtype=np.int8))
+    piece = np.concatenate(numbers)
+    if piece.any():
+        columns["piece"] = piece
     if path.exists() and not overwrite:
         raise ResultError(f"{path}: exists already; --force replaces it, in Python overwrite=True")
     _write(path, polygons, columns, origin)
@@ -191,14 +189,11 @@ def _pieces(outline: Outline, scale: float, shift: FloatArray, decomposed: bool)
         insist_on_simple(points)
         if not decomposed:
             vertex = ", ".join(repr(float(x)).removesuffix(".0") for x in (points[wrong[0]] + shift) / scale)
-            raise OutlineError(f"it is concave at the vertex ({vertex}); --decompose makes several separate bodies of "
-                               "it, which can move apart")
-        pieces = decompose(points)
+            raise OutlineError(f"it is concave at the vertex ({vertex}); --decompose makes a body of "
+                               "several convex pieces of it")
+        return decompose(points)
     except OutlineError as error:
         raise ResultError(f"{outline.place}: the outline cannot be a body: {error}{outline.hint}") from error
-    warnings.warn(f"{outline.place}: the outline is concave and becomes {len(pieces)} separate bodies, which can move "
-                  "apart", ConcaveOutline, stacklevel=4)
-    return pieces
 
 
 def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:

@@ -2,7 +2,8 @@
 !>
 !> H.-G. Matuttis & J. Chen, Understanding the Discrete Element Method, Wiley 2014, Eq. 7.6 and 7.7. The characteristic
 !> length is l = 4 r1 r2/(r1 + r2), where r1 and r2 are the distances of the force point (the centroid of the overlap)
-!> from the centres of mass. Two equal squares face to face have the stiffness E.
+!> from the centres of mass, or from the centroids of the pieces if bodies have several. Two equal squares face to face
+!> have the stiffness E.
 module polydem_area_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
@@ -60,7 +61,7 @@ contains
       real(wp) :: length(block_size), r1, r2, least, force
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
+      associate (unused_dt => dt, unused_history => history)
       end associate
       least = 1.0_wp
       do c = 1_ip, block%n
@@ -70,6 +71,10 @@ contains
          least = min(least, min(length(c)**2 - (2.0_wp*least_length)**2*block%area(c), &
                                 length(c) - block%degenerate(c)*block%length(c)))
       end do
+      if (bodies%pieces%most > 1_ip) then
+         call measure_pieces(bodies, block, length)
+         least = -1.0_wp
+      end if
       ! Without a short length, the square roots of the areas are not needed.
       if (least < 0.0_wp) then
          do c = 1_ip, block%n
@@ -89,6 +94,25 @@ contains
          block%normal_force(c) = block%normal_force(c) + force
       end do
    end subroutine add
+
+   !> Find the characteristic lengths of contacts between bodies of several pieces. The distances are those from the
+   !> centroids of the pieces: the centre of mass of a concave body may lie on its outline.
+   pure subroutine measure_pieces(bodies, block, length)
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      !> Characteristic length of each contact [m]
+      real(wp), intent(inout) :: length(block_size)
+      real(wp) :: r1, r2, arm(2)
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         arm = block%arm_first(c, :) - bodies%pieces%arm(:, block%piece(c, 1))
+         r1 = sqrt(arm(1)**2 + arm(2)**2)
+         arm = block%arm_second(c, :) - bodies%pieces%arm(:, block%piece(c, 2))
+         r2 = sqrt(arm(1)**2 + arm(2)**2)
+         length(c) = 4.0_wp*(r1*r2)/max(r1 + r2, tiny(r1))
+      end do
+   end subroutine measure_pieces
 
    !> Add the stiffness E L/l. An expected contact is a face on the edge with the greatest ratio L/l, where l is twice
    !> the distance of the edge from the centre.

@@ -22,7 +22,7 @@
 !> degenerate = 'stop' in &overlap to stop the run instead.
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: contact_block_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_linearised_contact, only: linearised_contact_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
@@ -38,7 +38,7 @@ module polydem_conservative_law
    type, extends(force_part_t) :: conservative_law_t
       !> Young's modulus in two dimensions E [N/m2]
       type(pair_value_t) :: stiffness
-      !> Reciprocal side 1/s of the square of each body's area, (slot) [1/m]
+      !> Reciprocal side 1/s of the square of each piece's area, (piece) [1/m]
       real(wp), allocatable :: inverse_size(:)
    contains
       procedure :: configure
@@ -67,7 +67,7 @@ contains
       self%stiffness = pairs%stiffness
    end subroutine configure
 
-   !> Measure the areas of the bodies.
+   !> Measure the areas of the pieces of bodies.
    subroutine measure(self, bodies)
       class(conservative_law_t), intent(inout) :: self
       !> Bodies, for their shapes
@@ -75,7 +75,13 @@ contains
       integer(ip) :: s
 
       if (allocated(self%inverse_size)) deallocate (self%inverse_size)
-      allocate (self%inverse_size(bodies%n))
+      allocate (self%inverse_size(bodies%pieces%n_pieces()))
+      if (bodies%pieces%most > 1_ip) then
+         do s = 1_ip, bodies%pieces%n_pieces()
+            self%inverse_size(s) = 1.0_wp/sqrt(bodies%pieces%area_of_piece(s))
+         end do
+         return
+      end if
       do s = 1_ip, bodies%n
          self%inverse_size(s) = 1.0_wp/sqrt(area_of(bodies, s))
       end do
@@ -107,26 +113,16 @@ contains
       !> Contacts with the effective area; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
-      real(wp) :: p, q, force, moment_first, moment_second, nearer
+      real(wp) :: force
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
+      associate (unused_dt => dt, unused_history => history)
       end associate
-      do c = 1_ip, block%n
-         p = self%inverse_size(block%first(c))
-         q = self%inverse_size(block%second(c))
-         block%inverse_length(c) = block%length(c)*(0.5_wp*(p + q)*max(p, q))
-         associate (r => block%arm_first(c, :), s => block%arm_second(c, :), n => block%normal(c, :))
-            moment_first = block%moment(c, 1) - (r(1)*n(2) - r(2)*n(1))
-            moment_second = block%moment(c, 2) - (s(1)*n(2) - s(2)*n(1))
-            nearer = (s(1)*s(1) + s(2)*s(2)) - (r(1)*r(1) + r(2)*r(2))
-         end associate
-         nearer = 0.5_wp + sign(0.5_wp, nearer) - 0.5_wp*merge(1.0_wp, 0.0_wp, abs(nearer) <= 0.0_wp)
-         block%lever(c) = -(nearer*moment_first + (1.0_wp - nearer)*moment_second)/block%length(c)
-         force = self%stiffness%one*block%area(c)*block%inverse_length(c)
-         block%elastic(c) = block%elastic(c) + force
-         block%normal_force(c) = block%normal_force(c) + force
-      end do
+      if (bodies%pieces%most == 1_ip) then
+         call add_of(self%inverse_size, self%stiffness%one, block%first, block%second, block)
+      else
+         call add_of(self%inverse_size, self%stiffness%one, block%piece(:, 1), block%piece(:, 2), block)
+      end if
       if (.not. allocated(self%stiffness%factor)) return
       do c = 1_ip, block%n
          force = self%stiffness%one*block%area(c)*block%inverse_length(c)
@@ -136,6 +132,35 @@ contains
       end do
       call self%stiffness%scale(block%n, block%material, block%inverse_length)
    end subroutine add
+
+   !> Add the force of one material.
+   pure subroutine add_of(inverse_size, stiffness, one, other, block)
+      !> Reciprocal side of the square of the area of each piece [1/m]
+      real(wp), intent(in), contiguous :: inverse_size(:)
+      !> Young's modulus [N/m2]
+      real(wp), intent(in) :: stiffness
+      !> First and second piece of each contact: columns of the block, which do not change
+      integer(ip), intent(in) :: one(block_size), other(block_size)
+      type(contact_block_t), intent(inout) :: block
+      real(wp) :: p, q, moment_first, moment_second, nearer, force
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         p = inverse_size(one(c))
+         q = inverse_size(other(c))
+         block%inverse_length(c) = block%length(c)*(0.5_wp*(p + q)*max(p, q))
+         associate (r => block%arm_first(c, :), s => block%arm_second(c, :), n => block%normal(c, :))
+            moment_first = block%moment(c, 1) - (r(1)*n(2) - r(2)*n(1))
+            moment_second = block%moment(c, 2) - (s(1)*n(2) - s(2)*n(1))
+            nearer = (s(1)*s(1) + s(2)*s(2)) - (r(1)*r(1) + r(2)*r(2))
+         end associate
+         nearer = 0.5_wp + sign(0.5_wp, nearer) - 0.5_wp*merge(1.0_wp, 0.0_wp, abs(nearer) <= 0.0_wp)
+         block%lever(c) = -(nearer*moment_first + (1.0_wp - nearer)*moment_second)/block%length(c)
+         force = stiffness*block%area(c)*block%inverse_length(c)
+         block%elastic(c) = block%elastic(c) + force
+         block%normal_force(c) = block%normal_force(c) + force
+      end do
+   end subroutine add_of
 
    !> Add upper bounds of the stiffness. K_n is E L^2/(l b), the characteristic length being l b/L.
    !>

@@ -11,6 +11,7 @@ module polydem_expected_contact
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, wp
+   use polydem_pieces, only: pieces_t
    implicit none
    private
    public :: expect_contact, cut_body
@@ -50,60 +51,110 @@ contains
       !> Length of the outline [m]
       real(wp), intent(out) :: outline
       type(cut_t) :: cut
+      real(wp), allocatable :: shape(:, :)
       real(wp) :: area
-      integer(ip) :: v, w, low, high
+      integer(ip) :: n, p, pieces(2), v, w
 
-      low = bodies%pieces%vertex_start(s)
-      high = bodies%pieces%vertex_start(s + 1_ip) - 1_ip
-      call start_contact(bodies, s, speed, element, outline, area)
+      call start_contact(bodies, s, speed, element, outline)
       element%materials = materials
       if (materials(1) /= materials(2)) then
          element%normal_mass = bodies%mass(s)
          element%normal_mobility = bodies%inverse_mass(s)
       end if
-      do v = low, high, 1_ip + (high - low)/most_cuts
-         w = merge(high, v - 1_ip, v == low)
-         call find_depth(law, bodies%pieces%vertex(:, low:high), w - low + 1_ip, v - low + 1_ip, area, element, cut)
-         element%edge_ratio = max(element%edge_ratio, cut%widest/(2.0_wp*cut%distance))
-         element%square_ratio = max(element%square_ratio, cut%widest**2/area)
-         if (cut%widest >= element%length) then
-            element%length = cut%widest
-            element%depth = 2.0_wp*cut%area/cut%length
-         end if
+      pieces = bodies%pieces%pieces_of(s)
+      do p = pieces(1), pieces(2)
+         shape = centred(bodies%pieces, p)
+         n = size(shape, 2, kind=ip)
+         area = area_of(shape)
+         do v = 1_ip, n, 1_ip + (n - 1_ip)/most_cuts
+            w = merge(n, v - 1_ip, v == 1_ip)
+            call find_depth(law, shape, w, v, area, element, cut)
+            element%edge_ratio = max(element%edge_ratio, cut%widest/(2.0_wp*cut%distance))
+            element%square_ratio = max(element%square_ratio, cut%widest**2/area)
+            if (cut%widest >= element%length) then
+               element%length = cut%widest
+               element%depth = 2.0_wp*cut%area/cut%length
+            end if
+         end do
       end do
    end subroutine expect_contact
 
    !> Start the expected contact with those of faces, at depth 0.
-   pure subroutine start_contact(bodies, s, speed, element, outline, area)
+   pure subroutine start_contact(bodies, s, speed, element, outline)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: speed
       type(linearised_contact_t), intent(out) :: element
-      !> Length of the outline [m], and area of the body [m2]
-      real(wp), intent(out) :: outline, area
-      real(wp) :: length, distance
-      integer(ip) :: v, w
+      !> Length of the outline [m]
+      real(wp), intent(out) :: outline
+      real(wp), allocatable :: shape(:, :)
+      integer(ip) :: p, pieces(2), v
 
       element%is_expected = .true.
       element%speed = speed
       element%inertia = bodies%inertia(s)
       element%normal_mass = 0.5_wp*bodies%mass(s)
       element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
-      area = 0.0_wp
       outline = 0.0_wp
-      w = bodies%pieces%vertex_start(s + 1_ip) - 1_ip
       do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip
-         call measure_edge(bodies%pieces%vertex(:, w), bodies%pieces%vertex(:, v), length, distance)
-         area = area + 0.5_wp*length*distance
-         outline = outline + length
          element%radius_square = max(element%radius_square, sum(bodies%pieces%vertex(:, v)**2))
-         element%length = max(element%length, length)
+      end do
+      pieces = bodies%pieces%pieces_of(s)
+      do p = pieces(1), pieces(2)
+         shape = centred(bodies%pieces, p)
+         call measure_faces(shape, element, outline)
+      end do
+      element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
+   end subroutine start_contact
+
+   !> Vertices of a piece relative to its centroid, (2, vertex) [m]
+   pure function centred(pieces, p) result(shape)
+      type(pieces_t), intent(in) :: pieces
+      integer(ip), intent(in) :: p
+      real(wp), allocatable :: shape(:, :)
+
+      shape = pieces%piece_polygon(p)
+      if (pieces%most > 1_ip) shape = shape - spread(pieces%centre(:, p), 2, size(shape, 2))
+   end function centred
+
+   !> Add the faces of a piece.
+   pure subroutine measure_faces(shape, element, outline)
+      !> Vertices, anticlockwise, (2, :) [m]
+      real(wp), intent(in) :: shape(:, :)
+      type(linearised_contact_t), intent(inout) :: element
+      !> Length of the outline so far [m]
+      real(wp), intent(inout) :: outline
+      real(wp) :: length, distance, longest
+      integer(ip) :: v, w
+
+      longest = 0.0_wp
+      w = size(shape, 2, kind=ip)
+      do v = 1_ip, size(shape, 2, kind=ip)
+         call measure_edge(shape(:, w), shape(:, v), length, distance)
+         outline = outline + length
+         longest = max(longest, length)
          element%edge_ratio = max(element%edge_ratio, length/(2.0_wp*distance))
          w = v
       end do
-      element%square_ratio = element%length*element%length/area
-      element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
-   end subroutine start_contact
+      element%length = max(element%length, longest)
+      element%square_ratio = max(element%square_ratio, longest*longest/area_of(shape))
+   end subroutine measure_faces
+
+   !> Area of a piece [m2]
+   pure real(wp) function area_of(shape) result(area)
+      !> Vertices, anticlockwise, relative to a point inside, (2, :) [m]
+      real(wp), intent(in) :: shape(:, :)
+      real(wp) :: length, distance
+      integer(ip) :: v, w
+
+      area = 0.0_wp
+      w = size(shape, 2, kind=ip)
+      do v = 1_ip, size(shape, 2, kind=ip)
+         call measure_edge(shape(:, w), shape(:, v), length, distance)
+         area = area + 0.5_wp*length*distance
+         w = v
+      end do
+   end function area_of
 
    !> Find the cut at the greatest depth of an impact on an edge. The depth of a face of the same length is an upper
    !> bound. From there the depth falls to the solution: the energy of the spring grows at most like its fourth power.
@@ -113,7 +164,7 @@ contains
       real(wp), intent(in) :: shape(:, :)
       !> First and second vertex of the edge
       integer(ip), intent(in) :: from, to
-      !> Area of the body [m2]
+      !> Area of the piece [m2]
       real(wp), intent(in) :: area
       !> Expected contact of the body so far
       type(linearised_contact_t), intent(in) :: element
@@ -146,7 +197,7 @@ contains
       !> Masses, speed and radius
       type(linearised_contact_t), intent(in) :: element
       type(cut_t), intent(in) :: cut
-      !> Area of the body [m2]
+      !> Area of the piece [m2]
       real(wp), intent(in) :: area
       type(linearised_contact_t) :: edge
 

@@ -5,6 +5,8 @@
 !> edges. The contact history remembers either. Contacts of the second kind are evaluated together, as a batch. All
 !> other pairs are searched one by one. The result is the same, whatever is remembered.
 !>
+!> If bodies have several pieces, pairs and polygons are those of pieces; the contacts are those of their bodies.
+!>
 !> A contact is *degenerate* if it has no direction: |N| is negligible against the square root of the area, because one
 !> body is inside the other, or bars cross. A degenerate contact gets the direction of the line of centres (or of the x
 !> axis if the centres coincide) and the side of a square of the same area as its length. With this length no force or
@@ -12,14 +14,16 @@
 !> A contact of a batch is never degenerate.
 module polydem_fill_block
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: copies_along_y, fold_offsets, nearest_copy
+   use polydem_cell, only: copies_along_y
    use polydem_contact_block, only: block_size, contact_block_t, copy_motion
    use polydem_contact_history, only: contact_history_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
+   use polydem_describe_pairs, only: describe_pairs, offset_of_contact
    use polydem_evaluate_batch, only: evaluate_batch
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: overlap_batch_t
    use polydem_overlap_tolerances, only: no_length
+   use polydem_piece_contacts, only: keep_pieces, refer_to_bodies, take_bodies
    use polydem_separation, only: test_edges
    implicit none
    private
@@ -28,13 +32,19 @@ module polydem_fill_block
    !> Number of pairs whose remembered edges are tested at a time
    integer(ip), parameter :: ahead = 2_ip*block_size
 
+   !> Where the walk over the pairs is
+   type :: place_t
+      !> Last pair to examine, next one, and first one whose remembered edges have been tested
+      integer(ip) :: low, next, tested
+   end type place_t
+
 contains
 
    !> Fill a block with contacts of pairs in descending order.
    subroutine fill_block(bodies, first, second, effective, low, next, tested, history, block)
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
-      !> Lower and higher slot of each pair
+      !> Lower and higher piece of each pair
       integer(ip), intent(in), contiguous :: first(:), second(:)
       !> Whether to compute the effective area
       logical, intent(in) :: effective
@@ -49,54 +59,90 @@ contains
       type(contact_history_t), intent(inout) :: history
       !> Contacts; the columns that the force law fills are not changed
       type(contact_block_t), intent(inout) :: block
-      type(overlap_batch_t) :: batch
-      logical :: all_certified
+      type(place_t) :: at
 
-      call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
-      call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%pieces%vertex_start, &
-                          bodies%position, block%first, block%second, batch)
-      if (bodies%cell%is_periodic) &
-         call fold_offsets(bodies%cell, block%n, block%first, block%second, bodies%folds, batch%offset)
-      call evaluate_batch(batch, block%n, bodies%pieces%turned, effective, bodies%isa, block%overlap_columns_t)
+      at = place_t(low, next, tested)
+      if (bodies%pieces%most == 1_ip) then
+         call fill(bodies, bodies%radius, bodies%pieces%vertex_start, bodies%pieces%turned, first, second, effective, &
+                   at, history, block)
+      else
+         call fill(bodies, bodies%pieces%radius, bodies%pieces%start, bodies%pieces%outline, first, second, effective, &
+                   at, history, block)
+      end if
+      next = at%next
+      tested = at%tested
+   end subroutine fill_block
+
+   !> Fill a block with contacts of the pairs of some polygons.
+   subroutine fill(bodies, radius, start, outline, first, second, effective, at, history, block)
+      type(bodies_t), intent(in) :: bodies
+      !> Greatest distance of a vertex from the centre of each polygon [m]
+      real(wp), intent(in), contiguous :: radius(:)
+      !> First vertex of each polygon
+      integer(ip), intent(in), contiguous :: start(:)
+      !> Turned vertices, relative to the centre of their polygon, (2, vertex) [m]
+      real(wp), intent(in), contiguous :: outline(:, :)
+      integer(ip), intent(in), contiguous :: first(:), second(:)
+      logical, intent(in) :: effective
+      type(place_t), intent(inout) :: at
+      type(contact_history_t), intent(inout) :: history
+      type(contact_block_t), intent(inout) :: block
+      type(overlap_batch_t) :: batch
+      logical :: all_certified, is_compound
+
+      is_compound = bodies%pieces%most > 1_ip
+      call select_pairs(bodies, radius, start, outline, first, second, at, history, block, batch)
+      call describe_pairs(bodies, block%n, block%pair, first, second, radius, start, block%first, block%second, batch)
+      if (is_compound) call take_bodies(bodies%pieces, block)
+      call evaluate_batch(batch, block%n, outline, effective, bodies%isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
-      if (.not. all_certified) call search_others(bodies, effective, batch%certified, history, block)
+      if (.not. all_certified) &
+         call search_others(bodies, radius, start, outline, effective, batch%certified, history, block)
+      if (is_compound) call refer_to_bodies(bodies, block)
       call copy_motion(bodies, block)
       if (bodies%cell%is_sheared) call add_jumps(bodies, block)
       call find_rates_and_directions(block)
       if (.not. all_certified) call direct_from_centres(bodies, block)
-   end subroutine fill_block
+   end subroutine fill
 
    !> Select the next pairs that may be contacts: those that no remembered edge separates.
-   subroutine select_pairs(bodies, first, second, low, next, tested, history, block, batch)
+   subroutine select_pairs(bodies, radius, start, outline, first, second, at, history, block, batch)
       type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in), contiguous :: radius(:)
+      integer(ip), intent(in), contiguous :: start(:)
+      real(wp), intent(in), contiguous :: outline(:, :)
       integer(ip), intent(in), contiguous :: first(:), second(:)
-      integer(ip), intent(in) :: low
-      integer(ip), intent(inout) :: next, tested
+      type(place_t), intent(inout) :: at
       type(contact_history_t), intent(inout) :: history
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t), intent(inout) :: batch
       integer(ip) :: nothing(ahead)
 
       block%n = 0_ip
-      do while (next >= low .and. block%n < block_size)
-         if (next < tested) then
-            tested = max(low, next - ahead + 1_ip)
-            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, &
-                                                                    history%memory)
-         end if
-         if (allocated(history%memory)) then
-            call select_in_range(tested, next, history%memory(tested:next), block, batch)
-         else
-            nothing = 0_ip
-            call select_in_range(tested, next, nothing(:next - tested + 1_ip), block, batch)
-         end if
-      end do
+      associate (low => at%low, next => at%next, tested => at%tested)
+         do while (next >= low .and. block%n < block_size)
+            if (next < tested) then
+               tested = max(low, next - ahead + 1_ip)
+               if (allocated(history%memory)) call forget_edges(bodies, radius, start, outline, tested, next, &
+                                                                first, second, history%memory)
+            end if
+            if (allocated(history%memory)) then
+               call select_in_range(tested, next, history%memory(tested:next), block, batch)
+            else
+               nothing = 0_ip
+               call select_in_range(tested, next, nothing(:next - tested + 1_ip), block, batch)
+            end if
+         end do
+      end associate
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
-   subroutine forget_edges(bodies, from, to, first, second, memory)
+   subroutine forget_edges(bodies, radius, start, outline, from, to, first, second, memory)
       type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in), contiguous :: radius(:)
+      integer(ip), intent(in), contiguous :: start(:)
+      real(wp), intent(in), contiguous :: outline(:, :)
       !> First and last pair, at most `ahead` pairs
       integer(ip), intent(in) :: from, to
       integer(ip), intent(in), contiguous :: first(:), second(:)
@@ -112,58 +158,16 @@ contains
       end do
       do done = 0_ip, n_found - 1_ip, block_size
          n = min(block_size, n_found - done)
-         call describe_pairs(n, found(done + 1:done + n), first, second, bodies%radius, bodies%pieces%vertex_start, &
-                             bodies%position, i, j, batch)
-         if (bodies%cell%is_periodic) call fold_offsets(bodies%cell, n, i, j, bodies%folds, batch%offset)
+         call describe_pairs(bodies, n, found(done + 1:done + n), first, second, radius, start, i, j, batch)
          do k = 1_ip, n
             batch%memory(k) = memory(found(done + k))
          end do
-         call test_edges(batch, n, size(bodies%pieces%turned, 2, kind=ip), bodies%pieces%turned, bodies%isa, apart)
+         call test_edges(batch, n, size(outline, 2, kind=ip), outline, bodies%isa, apart)
          do k = 1_ip, n
             memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
          end do
       end do
    end subroutine forget_edges
-
-   !> Choose the roles of the bodies, and copy sizes and places of their polygons to the batch.
-   !>
-   !> Roles are those of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
-   pure subroutine describe_pairs(n, pair, first, second, radius, start, position, i, j, batch)
-      !> Number of pairs
-      integer(ip), intent(in) :: n
-      !> Pairs
-      integer(ip), intent(in) :: pair(n)
-      integer(ip), intent(in), contiguous :: first(:), second(:)
-      !> Radii of the bodies [m]
-      real(wp), intent(in), contiguous :: radius(:)
-      !> First vertex of each body
-      integer(ip), intent(in), contiguous :: start(:)
-      !> Centres of the bodies [m]
-      real(wp), intent(in) :: position(2, size(radius))
-      !> Slots of P and of Q
-      integer(ip), intent(inout) :: i(block_size), j(block_size)
-      !> All but what is remembered is set
-      type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: exchange, c, p, q
-
-      do c = 1_ip, n
-         p = first(pair(c))
-         q = second(pair(c))
-         exchange = iand(ieor(p, q), -merge(1_ip, 0_ip, radius(q) < radius(p)))
-         batch%radius(c, 1) = min(radius(p), radius(q))
-         batch%radius(c, 2) = max(radius(p), radius(q))
-         p = ieor(p, exchange)
-         q = ieor(q, exchange)
-         i(c) = p
-         j(c) = q
-         batch%start(c, 1) = start(p)
-         batch%start(c, 2) = start(q)
-         batch%corners(c, 1) = start(p + 1_ip) - start(p)
-         batch%corners(c, 2) = start(q + 1_ip) - start(q)
-         batch%offset(c, 1) = position(1, q) - position(1, p)
-         batch%offset(c, 2) = position(2, q) - position(2, p)
-      end do
-   end subroutine describe_pairs
 
    !> Add pairs without remembered edge to a block, in descending order, until it is full.
    pure subroutine select_in_range(low, next, memory, block, batch)
@@ -191,21 +195,12 @@ contains
       block%n = c
    end subroutine select_in_range
 
-   !> Centre of the second body minus centre of the first; in a periodic cell the vector to the nearest copy [m]
-   pure function offset_of(bodies, i, j) result(offset)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: i, j
-      real(wp) :: offset(2)
-
-      offset(1) = bodies%position(1, j) - bodies%position(1, i)
-      offset(2) = bodies%position(2, j) - bodies%position(2, i)
-      if (bodies%cell%is_periodic) &
-         offset = nearest_copy(bodies%cell, min(bodies%folds(:, i), bodies%folds(:, j)), offset)
-   end function offset_of
-
    !> Search the overlaps of the pairs that are not certified, and remove those that are no contacts.
-   subroutine search_others(bodies, effective, certified, history, block)
+   subroutine search_others(bodies, radius, start, outline, effective, certified, history, block)
       type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in), contiguous :: radius(:)
+      integer(ip), intent(in), contiguous :: start(:)
+      real(wp), intent(in), contiguous :: outline(:, :)
       logical, intent(in) :: effective
       real(wp), intent(in) :: certified(:)
       type(contact_history_t), intent(inout) :: history
@@ -215,14 +210,20 @@ contains
 
       do c = 1_ip, block%n
          exists(c) = certified(c) > 0.0_wp
-         if (.not. exists(c)) call search(bodies, effective, c, history, block, exists(c))
+         if (.not. exists(c)) &
+            call search(bodies, radius, start, outline, effective, c, history, block, exists(c))
       end do
-      if (.not. all(exists(:block%n))) call remove_others(exists, block)
+      if (all(exists(:block%n))) return
+      if (bodies%pieces%most > 1_ip) call keep_pieces(exists, block)
+      call remove_others(exists, block)
    end subroutine search_others
 
    !> Search the overlap of one pair. What is remembered is no separating edge, and no lens that is certified.
-   subroutine search(bodies, effective, c, history, block, exists)
+   subroutine search(bodies, radius, start, outline, effective, c, history, block, exists)
       type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in), contiguous :: radius(:)
+      integer(ip), intent(in), contiguous :: start(:)
+      real(wp), intent(in), contiguous :: outline(:, :)
       logical, intent(in) :: effective
       !> Index in the block
       integer(ip), intent(in) :: c
@@ -231,15 +232,21 @@ contains
       !> Whether the polygons overlap
       logical, intent(out) :: exists
       type(overlap_t) :: overlap
-      integer(ip) :: memory, rejected
+      integer(ip) :: memory, rejected, i, j
       integer :: k
 
       rejected = 0_ip
+      i = block%first(c)
+      j = block%second(c)
+      if (bodies%pieces%most > 1_ip) then
+         i = block%piece(c, 1)
+         j = block%piece(c, 2)
+      end if
       if (allocated(history%memory)) rejected = max(0_ip, history%memory(block%pair(c)))
-      associate (start => bodies%pieces%vertex_start, turned => bodies%pieces%turned, radius => bodies%radius, &
-                 i => block%first(c), j => block%second(c), p => block%pair(c))
-         call find_overlap(turned(:, start(i):start(i + 1_ip) - 1_ip), turned(:, start(j):start(j + 1_ip) - 1_ip), &
-                           offset_of(bodies, i, j), radius(i), radius(j), effective, overlap, memory, rejected)
+      associate (p => block%pair(c))
+         call find_overlap(outline(:, start(i):start(i + 1_ip) - 1_ip), outline(:, start(j):start(j + 1_ip) - 1_ip), &
+                           offset_of_contact(bodies, block, c), radius(i), radius(j), effective, overlap, memory, &
+                           rejected)
          if (allocated(history%memory)) history%memory(p) = merge(rejected, memory, memory == 0_ip)
          exists = overlap%area > 0.0_wp
          if (.not. exists) then
@@ -325,7 +332,7 @@ contains
          if (.not. block%degenerate(c) > 0.0_wp) cycle
          block%length(c) = sqrt(block%area(c))
          block%direction(c, :) = [1.0_wp, 0.0_wp]
-         offset = offset_of(bodies, block%first(c), block%second(c))
+         offset = offset_of_contact(bodies, block, c)
          distance = length_of(offset(1), offset(2))
          if (distance > no_length*block%length(c)) block%direction(c, :) = -offset/distance
       end do

@@ -36,7 +36,7 @@ contains
       real(dp), allocatable :: equal_parts(:)
 
       n_ranges = min(int(omp_get_max_threads(), ip), most_ranges)
-      call divide_pairs(n_pairs, first, n_ranges, equal_parts, ends)
+      call divide_pairs(n_pairs, first, bodies%pieces, n_ranges, equal_parts, ends)
       !$omp parallel do if (n_ranges > 1_ip) schedule(static, 1) default(none) private(r) &
       !$omp    shared(bodies, first, second, history, contacts, rows, ends, n_ranges)
       do r = 1_ip, n_ranges

@@ -3,7 +3,6 @@ module polydem_fixed_overlaps
    use polydem_bodies, only: bodies_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_polygon, only: mass_properties
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
@@ -69,29 +68,54 @@ contains
       smaller_of = merge(j, i, bodies%radius(j) < bodies%radius(i))
    end function smaller_of
 
-   !> Overlap of two bodies, relative to the centre of the one with the smaller radius
-   pure function overlap_of(bodies, i, j) result(overlap)
+   !> Overlap of two bodies: area of the greatest overlap of their pieces, and its centroid relative to the centre of
+   !> the body with the smaller radius
+   function overlap_of(bodies, i, j) result(greatest)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: i, j
+      type(overlap_t) :: greatest
       type(overlap_t) :: overlap
-      integer(ip) :: memory, p, q, rejected
+      real(wp) :: offset(2)
+      integer(ip) :: a, b, memory, p, q, rejected, of_p(2), of_q(2)
 
       p = smaller_of(bodies, i, j)
       q = i + j - p
-      rejected = 0_ip
-      call find_overlap(bodies%pieces%turned_polygon(p), bodies%pieces%turned_polygon(q), &
-                        bodies%position(:, q) - bodies%position(:, p), bodies%radius(p), bodies%radius(q), .false., &
-                        overlap, memory, rejected)
+      offset = bodies%position(:, q) - bodies%position(:, p)
+      of_p = bodies%pieces%pieces_of(p)
+      of_q = bodies%pieces%pieces_of(q)
+      greatest%area = 0.0_wp
+      do a = of_p(1), of_p(2)
+         do b = of_q(1), of_q(2)
+            rejected = 0_ip
+            if (bodies%pieces%most == 1_ip) then
+               call find_overlap(bodies%pieces%turned_polygon(p), bodies%pieces%turned_polygon(q), offset, &
+                                 bodies%radius(p), bodies%radius(q), .false., overlap, memory, rejected)
+            else
+               call find_overlap(outline_of(bodies, a), outline_of(bodies, b), &
+                                 offset + (bodies%pieces%arm(:, b) - bodies%pieces%arm(:, a)), &
+                                 bodies%pieces%radius(a), bodies%pieces%radius(b), .false., overlap, memory, rejected)
+               overlap%centroid = overlap%centroid + bodies%pieces%arm(:, a)
+            end if
+            if (overlap%area > greatest%area) greatest = overlap
+         end do
+      end do
    end function overlap_of
 
+   !> Turned vertices of a piece relative to its centroid, (2, vertex) [m]
+   pure function outline_of(bodies, p) result(outline)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: p
+      real(wp) :: outline(2, bodies%pieces%start(p + 1_ip) - bodies%pieces%start(p))
+
+      outline = bodies%pieces%outline(:, bodies%pieces%start(p):bodies%pieces%start(p + 1_ip) - 1_ip)
+   end function outline_of
+
    !> Area of a body [m2]
-   real(wp) function area_of(bodies, s)
+   pure real(wp) function area_of(bodies, s)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
-      real(wp) :: centroid(2), second
 
-      call mass_properties(bodies%pieces%polygon(s), area_of, &
-                           centroid, second)
+      area_of = bodies%pieces%area_of(s)
    end function area_of
 
 end module polydem_fixed_overlaps

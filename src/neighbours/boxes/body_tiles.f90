@@ -7,12 +7,16 @@
 !> circumference of the body, not to its area.
 module polydem_body_tiles
    use polydem_elementary, only: hypotenuse
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, wp
+   use polydem_pieces, only: pieces_t
    use polydem_polygon, only: clip_half_plane, cross, diameter
    use polydem_polygon_list, only: polygon_list_t
+   use polydem_strings, only: to_text
    implicit none
    private
-   public :: cut_body
+   public :: cut_body, cut_pieces, refuse_tiles
 
    !> Grid for the division of a body; axis 1 is along its longest edge, axis 2 across
    type :: grid_t
@@ -27,6 +31,59 @@ module polydem_body_tiles
    end type grid_t
 
 contains
+
+   !> Report a body that would need too many boxes.
+   pure subroutine refuse_tiles(id, ratio, most_tiles, error)
+      !> Identifier of the body
+      integer(ip), intent(in) :: id
+      !> Diameter of the body in median diameters
+      real(wp), intent(in) :: ratio
+      !> Greatest number of tiles of all bodies
+      integer(ip), intent(in) :: most_tiles
+      !> Names the body
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, 'body '//to_text(id)//' is '//to_text(ratio)//' times as long as the '// &
+                 'median diameter of the free bodies; cut into tiles of that size, it and the bodies before it '// &
+                 'need more than '//to_text(most_tiles)//' boxes; set largest_ratio in &boxes above this ratio '// &
+                 'to keep it whole')
+   end subroutine refuse_tiles
+
+   !> Make tiles of the pieces of a body: a piece is one tile or is cut into several. A body of one piece that is not
+   !> cut gets no tile.
+   subroutine cut_pieces(pieces, s, median_diameter, largest_ratio, roundings, room, tiles, piece, fits)
+      type(pieces_t), intent(in) :: pieces
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> A piece that is longer than `largest_ratio` median diameters is cut [m, 1]
+      real(wp), intent(in) :: median_diameter, largest_ratio
+      !> Allowance for rounding, in units of epsilon
+      real(wp), intent(in) :: roundings
+      !> Number of tiles that may be added
+      integer(ip), intent(in) :: room
+      !> Tiles, to which those of the body are added
+      type(polygon_list_t), intent(inout) :: tiles
+      !> Piece of each tile, (tiles%n) or longer
+      integer(ip), allocatable, intent(inout) :: piece(:)
+      !> Whether the tiles are not too many
+      logical, intent(out) :: fits
+      integer(ip) :: before, known, p, range(2)
+
+      if (.not. allocated(piece)) allocate (piece(pieces%n_pieces()))
+      range = pieces%pieces_of(s)
+      fits = .true.
+      before = tiles%n
+      do p = range(1), range(2)
+         known = tiles%n
+         if (2.0_wp*pieces%radius(p)*(1.0_wp + roundings*epsilon(1.0_wp))/median_diameter > largest_ratio) then
+            call cut_body(pieces%piece_polygon(p), median_diameter, largest_ratio, room - (known - before), tiles, fits)
+            if (.not. fits) return
+         end if
+         if (tiles%n == known .and. range(2) > range(1)) call tiles%append_polygon(pieces%piece_polygon(p))
+         if (tiles%n > size(piece)) call grow(piece, known, 2_ip*tiles%n, 0_ip)
+         piece(known + 1_ip:tiles%n) = p
+      end do
+   end subroutine cut_pieces
 
    !> Append the tiles of a body. A body that is small enough has no tiles.
    pure subroutine cut_body(vertices, median_diameter, largest_ratio, room, tiles, fits)

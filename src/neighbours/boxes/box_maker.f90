@@ -2,7 +2,8 @@
 !>
 !> A body of common size has one box, the bounds of its turned vertices. The box of a much larger body, such as a long
 !> wall, would overlap half the scene. A large body is therefore cut into tiles (`polydem_body_tiles`), and each tile
-!> has its own box. The body itself remains one polygon. A body of a wall that has vanished has no box.
+!> has its own box. The body itself remains one polygon. The pieces of a body of several pieces are such tiles, or are
+!> cut into tiles like a body. A body of a wall that has vanished has no box.
 !>
 !> If two polygons share a point, their boxes share a point. For whole bodies this follows from the monotonicity of
 !> rounding. Boxes of tiles are padded by a few rounding errors of the size of the body: no gap opens between them when
@@ -10,17 +11,16 @@
 !> less than twice the margin, their boxes overlap.
 module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
-   use polydem_body_tiles, only: cut_body
+   use polydem_body_tiles, only: cut_body, cut_pieces, refuse_tiles
    use polydem_body_sizes, only: median_of_diameters
    use polydem_box_images, only: add_images, box_images_t, place_images, place_near
    use polydem_box_placement, only: extent_of, place_box, place_whole, turn
    use polydem_boxes, only: boxes_t
    use polydem_elementary, only: sine_and_cosine
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_polygon, only: diameter
    use polydem_polygon_list, only: polygon_list_t
-   use polydem_strings, only: to_text
    implicit none
    private
    public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, turn_and_bound_in_cell, place_boxes, &
@@ -52,6 +52,8 @@ module polydem_box_maker
       type(cut_body_t), allocatable :: cut(:)
       !> Tiles of these bodies in the body frame
       type(polygon_list_t) :: tiles
+      !> Piece of each tile; not allocated if every body has one piece
+      integer(ip), allocatable :: piece(:)
       !> Images of boxes in a periodic cell
       type(box_images_t) :: images
    end type box_maker_t
@@ -83,8 +85,8 @@ contains
       maker%margin = margin
       call cut_bodies(maker, bodies, largest_ratio, boxes%n, error)
       if (allocated(error)) return
-      boxes%n_pieces = bodies%n
-      boxes%one_to_one = boxes%n == boxes%n_pieces .and. .not. allocated(bodies%gone)
+      boxes%n_pieces = bodies%pieces%n_pieces()
+      boxes%one_to_one = boxes%n == boxes%n_pieces .and. bodies%pieces%most == 1_ip .and. .not. allocated(bodies%gone)
       allocate (boxes%bounds(4, boxes%n), boxes%piece(boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), &
                 boxes%passive(boxes%n), boxes%reach(boxes%n))
       do s = 1_ip, bodies%n
@@ -116,13 +118,17 @@ contains
          is_gone = .false.
          if (allocated(bodies%gone)) is_gone = bodies%gone(s)
          ! A body of small radius is small enough for certain.
-         if (.not. is_gone .and. &
-             2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) &
+         if (.not. is_gone .and. bodies%pieces%most > 1_ip) then
+            call cut_pieces(bodies%pieces, s, maker%median_diameter, largest_ratio, roundings, room, maker%tiles, &
+                            maker%piece, fits)
+         else if (.not. is_gone .and. &
+             2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) then
             call cut_body(bodies%pieces%polygon(s), &
                           maker%median_diameter, largest_ratio, room, maker%tiles, fits)
+         end if
          n_tiles = maker%tiles%n - known
          if (.not. fits) then
-            call refuse(bodies%id(s), bodies%diameter(s)/maker%median_diameter, error)
+            call refuse_tiles(bodies%id(s), bodies%diameter(s)/maker%median_diameter, most_tiles, error)
             return
          end if
          if (n_tiles == 0_ip .and. .not. is_gone) then
@@ -144,44 +150,36 @@ contains
       end do
    end subroutine cut_bodies
 
-   !> Report a body that would need too many boxes.
-   pure subroutine refuse(id, ratio, error)
-      integer(ip), intent(in) :: id
-      !> Diameter of the body in median diameters
-      real(wp), intent(in) :: ratio
-      type(error_t), allocatable, intent(inout) :: error
-
-      call raise(error, input_error, 'body '//to_text(id)//' is '//to_text(ratio)//' times as long as the '// &
-                 'median diameter of the free bodies; cut into tiles of that size, it and the bodies before it '// &
-                 'need more than '//to_text(most_tiles)//' boxes; set largest_ratio in &boxes above this ratio '// &
-                 'to keep it whole')
-   end subroutine refuse
-
    !> Set all but the bounds of the boxes of a body.
    pure subroutine describe_boxes(maker, bodies, s, boxes)
       type(box_maker_t), intent(in) :: maker
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       type(boxes_t), intent(inout) :: boxes
-      integer(ip) :: b, first, last
+      integer(ip) :: b, first, last, p
 
       b = maker%box(s)
       if (b > 0_ip) then
-         call describe_box(bodies, s, bodies%diameter(s), maker%margin, b, boxes)
+         call describe_box(bodies, bodies%pieces%first_of(s), s, bodies%diameter(s), maker%margin, b, boxes)
          return
       end if
       associate (cut => maker%cut(-b), tiles => maker%tiles)
          do b = 0_ip, cut%n - 1_ip
             first = tiles%first(cut%first_tile + b)
             last = tiles%first(cut%first_tile + b + 1_ip) - 1_ip
-            call describe_box(bodies, s, diameter(tiles%vertex(:, first:last)), cut%padding, cut%first_box + b, boxes)
+            p = s
+            if (allocated(maker%piece)) p = maker%piece(cut%first_tile + b)
+            call describe_box(bodies, p, s, diameter(tiles%vertex(:, first:last)), cut%padding, cut%first_box + b, &
+                              boxes)
          end do
       end associate
    end subroutine describe_boxes
 
    !> Set all but the bounds of a box.
-   pure subroutine describe_box(bodies, s, length, padding, b, boxes)
+   pure subroutine describe_box(bodies, p, s, length, padding, b, boxes)
       type(bodies_t), intent(in) :: bodies
+      !> Index of the piece
+      integer(ip), intent(in) :: p
       integer(ip), intent(in) :: s
       !> Diameter of the body or tile, and padding of the box [m]
       real(wp), intent(in) :: length, padding
@@ -189,7 +187,7 @@ contains
       integer(ip), intent(in) :: b
       type(boxes_t), intent(inout) :: boxes
 
-      boxes%piece(b) = s
+      boxes%piece(b) = p
       boxes%body(b) = s
       boxes%fixed(b) = bodies%fixed(s)
       boxes%passive(b) = bodies%fixed(s) .or. bodies%in_halo(s)

@@ -72,6 +72,10 @@ contains
       call order_vertices(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
       call mix_blocks(comm, block, hash)
+      if (bodies%pieces%most > 1_ip) then
+         call blocks%to_blocks(comm, reshape(int(bodies%pieces%number, lp), [1, size(bodies%pieces%number)]), block)
+         call mix_blocks(comm, block, hash)
+      end if
       if (allocated(bodies%material)) then
          call order_bodies(comm, bodies, blocks)
          call blocks%to_blocks(comm, reshape(int(bodies%material, lp), [1, size(bodies%material)]), block)

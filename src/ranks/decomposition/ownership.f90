@@ -11,7 +11,8 @@ module polydem_ownership
    use polydem_kinds, only: ip, lp
    implicit none
    private
-   public :: owns_body, owns_pair, find_owned_pairs, order_bodies, order_vertices, order_pairs
+   public :: owns_body, owns_pair, find_owned_pairs, order_bodies, order_vertices, order_pairs, &
+      order_pieces
 
 contains
 
@@ -145,5 +146,40 @@ contains
       end do
       call blocks%lay_out(comm, bodies%n_all, key(:n), slot(:n))
    end subroutine order_pairs
+
+   !> Find the global order of columns over pairs of pieces, of which not both bodies are fixed. Collective.
+   subroutine order_pieces(comm, bodies, first, second, blocks)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> The two pieces of each pair, in ascending order
+      integer(ip), intent(in) :: first(:), second(:)
+      !> Destination of each row
+      type(row_distribution_t), intent(inout) :: blocks
+      integer(lp), allocatable :: key(:)
+      integer(ip), allocatable :: slot(:)
+      integer(ip) :: k, n
+
+      allocate (key(size(first)), slot(size(first)))
+      n = 0_ip
+      do k = 1_ip, size(first, kind=ip)
+         if (.not. owns_pair(bodies, bodies%pieces%body_of(first(k)), bodies%pieces%body_of(second(k)))) cycle
+         n = n + 1_ip
+         key(n) = pair_key(place_of(first(k)), place_of(second(k)))
+         slot(n) = k
+      end do
+      call blocks%lay_out(comm, bodies%n_all*bodies%pieces%most, key(:n), slot(:n))
+
+   contains
+
+      !> Place of a piece if every body had the greatest number of pieces, from 1
+      pure integer(ip) function place_of(p)
+         integer(ip), intent(in) :: p
+
+         associate (s => bodies%pieces%body_of(p))
+            place_of = (bodies%global_index(s) - 1_ip)*bodies%pieces%most + (p - bodies%pieces%first_of(s)) + 1_ip
+         end associate
+      end function place_of
+
+   end subroutine order_pieces
 
 end module polydem_ownership

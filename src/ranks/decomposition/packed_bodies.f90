@@ -29,6 +29,8 @@ module polydem_packed_bodies
       integer :: isa = isa_base
       !> Whether the bodies have materials
       logical :: has_materials = .false.
+      !> Greatest number of pieces of a body of the run
+      integer(ip) :: most_pieces = 1_ip
       !> Periodic cell in which the bodies are
       type(cell_t) :: cell
    end type packed_bodies_t
@@ -58,6 +60,7 @@ contains
       packed%last_id = bodies%last_id
       packed%isa = bodies%isa
       packed%has_materials = allocated(bodies%material)
+      packed%most_pieces = bodies%pieces%most
       packed%cell = bodies%cell
       corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       packed%list%slots = slots
@@ -182,7 +185,7 @@ contains
       call read_list(packed, global_index, corners)
       n = size(corners, kind=ip)
       order = ascending_order(int(global_index, lp))
-      call allocate_with_corners(bodies, corners(order))
+      call allocate_with_corners(bodies, corners(order), packed%most_pieces)
       bodies%n_all = packed%n_all
       bodies%last_id = packed%last_id
       bodies%isa = packed%isa
@@ -196,6 +199,7 @@ contains
       bodies%global_index = global_index(order)
       call packed%vertices%restore_to(vertices_of(bodies%pieces%vertex_start(slots), corners))
       call serialize_vertices(packed%vertices, bodies)
+      call bodies%pieces%find_pieces()
       bodies%free = pack([(s, s=1_ip, n)],.not. bodies%fixed)
    end subroutine unpack_bodies
 

@@ -75,7 +75,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Number of pairs
       integer(ip), intent(in) :: n_pairs
-      !> Slots of the bodies of each pair
+      !> Pieces of each pair
       integer(ip), intent(in) :: first(:), second(:)
       real(dp), allocatable :: weight(:), of_slot(:)
       integer(ip) :: p
@@ -83,8 +83,10 @@ contains
       allocate (of_slot(bodies%n))
       of_slot = base_weight
       do p = 1_ip, n_pairs
-         of_slot(first(p)) = of_slot(first(p)) + 1.0_dp
-         of_slot(second(p)) = of_slot(second(p)) + 1.0_dp
+         associate (i => bodies%pieces%body_of(first(p)), j => bodies%pieces%body_of(second(p)))
+            of_slot(i) = of_slot(i) + 1.0_dp
+            of_slot(j) = of_slot(j) + 1.0_dp
+         end associate
       end do
       weight = of_slot(bodies%free)
    end function work_of_bodies

@@ -40,6 +40,9 @@ module polydem_grains
       procedure :: append
    end type grains_t
 
+   !> Number of the piece of each corner of a cross
+   integer(ip), parameter :: pieces_of_cross(12) = [spread(0_ip, 1, 4), spread(1_ip, 1, 4), spread(2_ip, 1, 4)]
+
 contains
 
    !> Make room for all grains.
@@ -89,6 +92,10 @@ contains
                                          0.5_wp*group%height)
             length = sizes(k)*greatest_length(group)
             call turn_at_random(group, random, corners)
+         case ('cross')
+            corners = sizes(k)*hull_of_cross(group%width, group%arm)
+            length = sizes(k)*greatest_length(group)
+            call turn_at_random(group, random, corners)
          case ('outline')
             corners = sizes(k)*as_corners(group%outline)
             length = sizes(k)*greatest_length(group)
@@ -97,6 +104,7 @@ contains
             call draw_corners(group, sizes(k), random, corners, length)
          end select
          call mass_properties(corners, area, centroid, second_moment)
+         if (group%shape == 'cross') area = sizes(k)**2*group%arm*(2.0_wp*group%width - group%arm)
          call grains%append(corners, length, area)
       end do
    end subroutine draw_grains
@@ -111,6 +119,8 @@ contains
          greatest_length = group%diameter(2)
       case ('rectangle')
          greatest_length = hypotenuse(group%width, group%height)
+      case ('cross')
+         greatest_length = hypotenuse(group%width, group%arm)
       case ('outline')
          associate (corners => as_corners(group%outline))
             greatest_length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))
@@ -170,6 +180,7 @@ contains
       allocate (order(size(centres, 2)))
       order = [(k, k=1_ip, size(order, kind=ip))]
       if (group%order == 'descending') call sort_reals(-centres(1, :), order)
+      if (group%shape == 'cross') list%most_pieces = max(list%most_pieces, 3_ip)
       do j = 1_ip, size(order, kind=ip)
          k = order(j)
          if (list%leaves_next()) then
@@ -179,10 +190,47 @@ contains
          corners = grains%polygon(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
+         if (group%shape == 'cross') then
+            call list%append(cross_in(corners, group%arm/group%width), density=density, velocity=velocities(:, k), &
+                             angular_velocity=spins(k), material=material, piece=pieces_of_cross)
+            cycle
+         end if
          call list%append(corners, density=density, velocity=velocities(:, k), angular_velocity=spins(k), &
                           material=material)
       end do
    end subroutine append_grains
+
+   !> Convex hull of a cross, (2, 8) [m]
+   pure function hull_of_cross(width, arm) result(corners)
+      !> Distance of opposite ends, and width of the arms [m]
+      real(wp), intent(in) :: width, arm
+      real(wp) :: corners(2, 8)
+      real(wp) :: w, a
+
+      w = 0.5_wp*width
+      a = 0.5_wp*arm
+      corners = reshape([w, -a, w, a, a, w, -a, w, -w, a, -w, -a, -a, -w, a, -w], [2, 8])
+   end function hull_of_cross
+
+   !> The pieces of a cross with a given hull: a bar from end to end, and an arm on either side of it
+   pure function cross_in(hull, ratio) result(corners)
+      !> Corners of the hull as `hull_of_cross` makes them, turned and moved (2, 8) [m]
+      real(wp), intent(in) :: hull(:, :)
+      !> Width of the arms over the width of the cross
+      real(wp), intent(in) :: ratio
+      real(wp) :: corners(2, 12)
+      real(wp) :: near, far
+
+      near = 0.5_wp*(1.0_wp - ratio)
+      far = 0.5_wp*(1.0_wp + ratio)
+      corners(:, 1:4) = hull(:, [1, 2, 5, 6])
+      corners(:, 5) = hull(:, 2) + near*(hull(:, 5) - hull(:, 2))
+      corners(:, 6:7) = hull(:, 3:4)
+      corners(:, 8) = hull(:, 2) + far*(hull(:, 5) - hull(:, 2))
+      corners(:, 9) = hull(:, 6) + near*(hull(:, 1) - hull(:, 6))
+      corners(:, 10:11) = hull(:, 7:8)
+      corners(:, 12) = hull(:, 6) + far*(hull(:, 1) - hull(:, 6))
+   end function cross_in
 
    !> Area of a settled bed of grains, voids included [m2]
    pure real(wp) function settled_area(group, n)

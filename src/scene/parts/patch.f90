@@ -59,6 +59,10 @@ contains
       integer(ip), allocatable :: chosen(:), order(:)
       integer(ip) :: k
 
+      if (bodies%pieces%most > 1_ip) then
+         call raise(error, input_error, 'its bodies have several pieces; a packing is made of convex grains only')
+         return
+      end if
       centres = bodies%position(:, bodies%free)
       call find_middle(centres, low, high, distance)
       if (any(.not. high - low > least_size*distance)) then

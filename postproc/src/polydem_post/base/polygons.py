@@ -19,6 +19,64 @@ def join(outlines: list[FloatArray]) -> tuple[FloatArray, IntArray]:
     return vertex, start
 
 
+def join_pieces(vertex: FloatArray, start: npt.NDArray[np.integer], piece: IntArray) -> tuple[FloatArray, IntArray]:
+    """Outlines of bodies whose rows are those of several convex pieces; `piece` numbers them within each body."""
+    outlines = []
+    for first, last in zip(start, start[1:]):
+        ends = np.flatnonzero(np.diff(piece[first:last])) + 1
+        outlines.append(outline_of(np.split(vertex[first:last], ends)))
+    return join(outlines)
+
+
+def outline_of(pieces: list[FloatArray]) -> FloatArray:
+    """The outline of anticlockwise polygons that touch: edges that two of them share, wholly or in part, are left out.
+
+    If it is not one closed line (islands, holes), the lines are joined by two coincident edges each, so that sums
+    over edges, such as areas, and fillings remain right.
+    """
+    if len(pieces) == 1:
+        return pieces[0]
+    points = np.concatenate(pieces)
+    near = 1e-7 * float(np.ptp(points, axis=0).max())
+    labels = np.array([np.argmin(np.hypot(*(points - point).T) > near) for point in points])
+    edges: set[tuple[int, int]] = set()
+    row = 0
+    for polygon in pieces:
+        own = labels[row : row + len(polygon)]
+        row += len(polygon)
+        for a, b in zip(own, np.roll(own, -1)):
+            along = points[b] - points[a]
+            offset = points - points[a]
+            place = offset @ along / (along @ along)
+            distance = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / np.hypot(*along)
+            on_edge = np.flatnonzero((distance < near) & (place > 0.0) & (place < 1.0))
+            stops = [a, *dict.fromkeys(labels[on_edge[np.argsort(place[on_edge])]].tolist()), b]
+            stops = list(dict.fromkeys(int(stop) for stop in stops))
+            for edge in zip(stops, stops[1:]):
+                if edge[::-1] in edges:
+                    edges.remove(edge[::-1])
+                else:
+                    edges.add(edge)
+    return _chained(points, edges)
+
+
+def _chained(points: FloatArray, edges: set[tuple[int, int]]) -> FloatArray:
+    """Closed lines of edges, given by rows of points, in one outline."""
+    after: dict[int, list[int]] = {}
+    for a, b in sorted(edges):
+        after.setdefault(a, []).append(b)
+    rows: list[int] = []
+    while any(after.values()):
+        first = next(a for a, ends in after.items() if ends)
+        line = [first]
+        while after.get(line[-1]):
+            line.append(after[line[-1]].pop())
+            if line[-1] == first:
+                break
+        rows = [*rows, *line, rows[0]] if rows else line
+    return points[rows[:-1]]
+
+
 def following(start: npt.NDArray[np.integer]) -> IntArray:
     """Row of the next vertex of the same polygon, for each vertex."""
     rows = np.arange(1, int(start[-1]) + 1)

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
+from ..base.polygons import join_pieces
 from ..base.result_file import (
     ResultError,
     balance_of,
@@ -472,6 +473,9 @@ def _bodies_in(file: h5py.File) -> dict[str, Any]:
     bodies = file["bodies"]
     columns = {"id": bodies["id"][:], "fixed": bodies["fixed"][:].astype(bool), "shape": bodies["vertex"][:],
                "vertex_start": bodies["vertex_start"][:]}
+    if "piece" in bodies:
+        columns["shape"], columns["vertex_start"] = join_pieces(columns["shape"], columns["vertex_start"],
+                                                                bodies["piece"][:])
     for name in ("mass", "inertia"):
         values = bodies[name][:]
         columns[name] = np.where(values == 0.0, np.inf, values)
