@@ -57,8 +57,8 @@ contains
          if (load%between(1)%text == load%between(2)%text) call blame(instance, 'between', &
             'names the same wall twice; it must name two walls, as in ''left'', ''right''', error)
          if (load%between(1)%text == load%wall .or. load%between(2)%text == load%wall) call blame(instance, 'between', &
-            'names the wall that yields; the width is the distance of two other walls, across the direction of the load', &
-            error)
+            'names the wall that yields; the width is the distance of two other walls, across the direction '// &
+            'of the load', error)
       end if
       if (load%end > 0.0_wp .and. load%end <= load%start) call blame(instance, 'end', 'must be behind ''start''', &
          error, 'start')

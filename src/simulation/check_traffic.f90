@@ -5,7 +5,7 @@ module polydem_check_traffic
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_exchange_bodies, only: meets_fixed
-   use polydem_kinds, only: lp, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_random, only: random_t
    use polydem_simulation, only: simulation_t
    use polydem_source, only: candidate_t, source_t
@@ -60,6 +60,8 @@ contains
       integer :: k
 
       if (.not. allocated(self%traffic)) return
+      if (self%bodies%pieces%most > 1_ip) call raise(error, input_error, place_of(self%settings, 'grains', 'shape')// &
+         ': bodies of several pieces cannot be combined with &source and &sink; leave these out, or give convex bodies')
       do k = 1, size(self%traffic%sources)
          if (.not. allocated(error)) call check_source(self, self%traffic%sources(k), error)
       end do

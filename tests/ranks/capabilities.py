@@ -78,6 +78,10 @@ CAPABILITIES = {
         groups="&stage name = 'smooth' until = 'kinetic' below = 1e3 hold = 7e-3 longest = 1 check = 7"
                " friction_scale = 0 /\n"
                "&stage name = 'rough' duration = 0.011 gravity = 20, -20 /\n"),
+    "pieces": Capability(upper="shape = 'cross' width = 0.012 arm = 0.004"),
+    "traffic": Capability(
+        groups="&source name = 'feed' low = -0.045, 0.01 high = 0.045, 0.045 count = 50 interval = 20 velocity = 0, -1 /\n"
+               "&sink name = 'bin' low = -0.05, -0.05 high = 0.05, -0.035 interval = 20 /\n"),
     "series": Capability(groups="&sample area = 'rectangle' low = -0.04, -0.04 high = 0.03, 0.04 /\n",
                          output="series_interval = 2e-4 csv = .true."),
 }
@@ -87,6 +91,7 @@ REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",
+    ("pieces", "traffic"): "cannot be combined with &source and &sink",
     ("hunt_crossley", "materials"): "'restitution' in &material hard is not used",
 }
 

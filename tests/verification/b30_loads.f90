@@ -114,8 +114,8 @@ contains
       outside = to_text(side_of(number) + 0.04_wp, 8)
       text = &
          '&material name = ''smooth'' friction_coefficient = 0 / &scene wall_material = ''smooth'' / '// &
-         '&wall name = ''left'' outline = ''rectangle'' low = -'//outside//', -'//half//' high = -'//half//', '//half// &
-         ' / &wall name = ''right'' outline = ''rectangle'' low = '//half//', -'//half//' high = '//outside//', '// &
+         '&wall name = ''left'' outline = ''rectangle'' low = -'//outside//', -'//half//' high = -'//half//', '// &
+         half//' / &wall name = ''right'' outline = ''rectangle'' low = '//half//', -'//half//' high = '//outside//', '// &
          half//' / &wall name = ''bottom'' outline = ''rectangle'' low = -'//outside//', -'//outside//' high = '// &
          outside//', -'//half//' / &wall name = ''top'' outline = ''rectangle'' low = -'//outside//', '//half// &
          ' high = '//outside//', '//outside//' / &grains name = ''sample'' region = ''box'' low = -'//half//', -'// &
