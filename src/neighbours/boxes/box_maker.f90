@@ -234,6 +234,7 @@ contains
       real(wp) :: extent(4, block_size), direction(2, block_size)
 
       call turn_block(bodies, slots, extent, direction)
+      if (bodies%pieces%most > 1_ip) call bodies%pieces%turn_pieces(slots, direction)
       call place_boxes(maker, slots, extent, direction, bodies, boxes)
    end subroutine turn_and_bound_block
 
@@ -250,6 +251,7 @@ contains
       real(wp) :: extent(4, block_size), direction(2, block_size)
 
       call turn_block(bodies, slots, extent, direction)
+      if (bodies%pieces%most > 1_ip) call bodies%pieces%turn_pieces(slots, direction)
       call place_in_cell(maker, slots, extent, direction, bodies, boxes)
    end subroutine turn_and_bound_in_cell
 
