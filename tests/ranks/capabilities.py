@@ -80,7 +80,8 @@ CAPABILITIES = {
                "&stage name = 'rough' duration = 0.011 gravity = 20, -20 /\n"),
     "pieces": Capability(upper="shape = 'cross' width = 0.012 arm = 0.004"),
     "traffic": Capability(
-        groups="&source name = 'feed' low = -0.045, 0.01 high = 0.045, 0.045 count = 50 interval = 20 velocity = 0, -1 /\n"
+        groups="&source name = 'feed' low = -0.045, 0.01 high = 0.045, 0.045 count = 50 interval = 20"
+               " velocity = 0, -1 /\n"
                "&sink name = 'bin' low = -0.05, -0.05 high = 0.05, -0.035 interval = 20 /\n"),
     "series": Capability(groups="&sample area = 'rectangle' low = -0.04, -0.04 high = 0.03, 0.04 /\n",
                          output="series_interval = 2e-4 csv = .true."),

@@ -108,18 +108,17 @@ contains
       integer, intent(in) :: number
       !> Entries of &integrate
       character(len=*), intent(in) :: entries
-      character(len=:), allocatable :: text, half, outside
+      character(len=:), allocatable :: text
+      real(wp) :: half, outside
 
-      half = to_text(side_of(number), 8)
-      outside = to_text(side_of(number) + 0.04_wp, 8)
+      half = side_of(number)
+      outside = half + 0.04_wp
       text = &
          '&material name = ''smooth'' friction_coefficient = 0 / &scene wall_material = ''smooth'' / '// &
-         '&wall name = ''left'' outline = ''rectangle'' low = -'//outside//', -'//half//' high = -'//half//', '// &
-         half//' / &wall name = ''right'' outline = ''rectangle'' low = '//half//', -'//half//' high = '//outside//', '// &
-         half//' / &wall name = ''bottom'' outline = ''rectangle'' low = -'//outside//', -'//outside//' high = '// &
-         outside//', -'//half//' / &wall name = ''top'' outline = ''rectangle'' low = -'//outside//', '//half// &
-         ' high = '//outside//', '//outside//' / &grains name = ''sample'' region = ''box'' low = -'//half//', -'// &
-         half//' high = '//half//', '//half//' number = '//to_text(number)//' shape = ''regular'' corners = 5, 7 '// &
+         rectangle('left', -outside, -half, -half, half)//rectangle('right', half, -half, outside, half)// &
+         rectangle('bottom', -outside, -outside, outside, -half)//rectangle('top', -outside, half, outside, outside)// &
+         '&grains name = ''sample'' region = ''box'' low = '//numbers([-half, -half])//' high = '// &
+         numbers([half, half])//' number = '//to_text(number)//' shape = ''regular'' corners = 5, 7 '// &
          'diameter = 0.014, 0.02 speed = 0.1 / '// &
          '&load name = ''side'' wall = ''right'' direction = ''x'' stress = -2e3 between = ''bottom'', ''top'' '// &
          'mass = 2 damping_ratio = 0.02 / '// &
@@ -129,6 +128,24 @@ contains
          ' start = 1 ramp = 0.1 / &forces gravity = 0, 0 stiffness = 1e6 friction_coefficient = 0.3 / '// &
          '&integrate '//entries//' /'
    end function biaxial
+
+   !> A group &wall
+   function rectangle(name, left, bottom, right, top) result(text)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: left, bottom, right, top
+      character(len=:), allocatable :: text
+
+      text = '&wall name = '''//name//''' outline = ''rectangle'' low = '//numbers([left, bottom])//' high = '// &
+         numbers([right, top])//' / '
+   end function rectangle
+
+   !> Two numbers of a namelist
+   function numbers(values) result(text)
+      real(wp), intent(in) :: values(2)
+      character(len=:), allocatable :: text
+
+      text = to_text(values(1), 8)//', '//to_text(values(2), 8)
+   end function numbers
 
    !> Half the side of the box of so many grains [m]
    pure real(wp) function side_of(number)
