@@ -199,7 +199,7 @@ class Frame:
 
     @cached_property
     def spans(self) -> npt.NDArray[np.bool_]:
-        """Whether each body is a fixed one that is about as long as the cell and has no copies along it, (n, 2)."""
+        """Whether each body is a fixed one about as long as the cell, without copies along it [1], (n, 2)."""
         reach = np.abs(self.bounds.reshape(-1, 2, 2) - self.position[:, None, :]).max(axis=1)
         return self.fixed[:, None] & (self.cell_size > 0.0) & (4.0 * reach >= self.cell_size)
 
