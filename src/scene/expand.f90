@@ -12,8 +12,8 @@ module polydem_expand
    public :: expand_scene
 
    !> Keys of &scene that are no arguments of a recipe; also all that begin with `motion`
-   character(len=*), parameter :: common(*) = [character(len=13) :: 'bodies_file', 'seed', 'density', 'material', &
-      'wall_material']
+   character(len=*), parameter :: common(*) = [character(len=14) :: 'bodies_file', 'seed', 'density', 'material', &
+      'wall_material', 'remove_overlap']
 
 contains
 

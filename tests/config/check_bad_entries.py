@@ -158,9 +158,9 @@ def with_required(row):
             entries.update({"duration": "1"} if until == "duration" else {"longest": "1", "below": "1"})
             entries.update({"wall": f"'{NAME}'", "opposite": f"'{NAME}'"} if until == "strain" else {})
             entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
+            entries.update({"component": "xx"} if until == "stress" else {})
         if row.group == "source":
             entries.update(PARTS["shape"][entries.setdefault("shape", "ellipse")])
-            entries.update({"component": "xx"} if until == "stress" else {})
         if entries.get("area") == "rectangle":
             entries.update({"low": "0, 0", "high": "1, 1"})
         if row.group == "sample" and word == "walls":
