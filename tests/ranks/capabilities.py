@@ -78,7 +78,7 @@ CAPABILITIES = {
         groups="&stage name = 'smooth' until = 'kinetic' below = 1e3 hold = 7e-3 longest = 1 check = 7"
                " friction_scale = 0 /\n"
                "&stage name = 'rough' duration = 0.011 gravity = 20, -20 /\n"),
-    "pieces": Capability(upper="shape = 'cross' width = 0.012 arm = 0.004"),
+    "pieces": Capability(upper="shape = 'cross' width = 0.009 arm = 0.003"),
     "traffic": Capability(
         groups="&source name = 'feed' low = -0.045, 0.01 high = 0.045, 0.045 count = 50 interval = 20"
                " velocity = 0, -1 /\n"
