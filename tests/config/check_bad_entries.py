@@ -168,6 +168,8 @@ def with_required(row):
         if entries.get("direction") == "angle":
             entries["torque"] = "1"
         groups = {**({"grains": parts["grains"]} if row.group == "cell" else parts), row.group: entries}
+        if entries.get("until") == "stress":
+            groups["sample"] = {"area": "rectangle", "low": "0, 0", "high": "1, 1"}
         yield {**{entry_of(group, name): value for group, given in groups.items()
                   for name, value in {**({"name": f"'{NAME}'"} if group in REPEATABLE else {}), **given}.items()},
                **({} if row.group == "stage" else {"integrate.duration": "1e-3"})}
@@ -273,10 +275,18 @@ def fault_of_answer(case, code, output, message):
         return ""
     if case.name.endswith(".longest") and "duration" in message:
         return ""
+    # The scene has one wall only, and a sample between walls needs two.
+    if case.row.group == "sample" and "names the same wall twice" in message:
+        return ""
+    # A light wall needs small steps, and a table of a motion is not there.
+    if case.row.group == "load" and case.row.key == "mass" and "requires" in message:
+        return ""
+    if case.row.group == "motion" and "none.csv: no such file" in message:
+        return ""
     # What two parts do to each other is said of one of them.
     named = [case.row.key, *[f"{part} {NAME}" for part in ("grains", "wall") if case.row.group in ("grains", "wall")],
              *[f"{part} {NAME}" for part in ("source", "stage") if case.row.group == part],
-             "bodies of &grains and &wall"]
+             "bodies of &grains and &wall", "bodies of &source"]
     if not any(name in message for name in named):
         return f"the message does not name the entry: {message[:300]!r}"
     place = "--set " if case.is_override else r"case\.nml:\d+: "
