@@ -11,10 +11,11 @@ module polydem_ragged_segment
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
+   use polydem_frame_poses, only: write_poses
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_ownership, only: order_bodies, order_vertices
-   use polydem_row_distribution, only: component, row_distribution_t, vector
+   use polydem_row_distribution, only: component, row_distribution_t
    implicit none
    private
    public :: ragged_rows_t, append_bodies, add_ragged_frame
@@ -129,19 +130,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(row_distribution_t) :: blocks
       type(part_t) :: part
-      real(dp), allocatable :: state(:, :), block(:, :)
-      integer(lp), allocatable :: ids(:, :), images(:, :)
-      integer(ip) :: s
+      integer(lp), allocatable :: ids(:, :)
 
       call order_bodies(comm, bodies, blocks)
       part = part_t(blocks%first, blocks%total)
-      allocate (state(6, bodies%n))
-      do s = 1_ip, bodies%n
-         state(:, s) = real([bodies%position(:, s), bodies%angle(s), bodies%velocity(:, s), &
-                             bodies%angular_velocity(s)], dp)
-      end do
       call blocks%to_blocks(comm, reshape(int(bodies%id, lp), [1_ip, bodies%n]), ids)
-      call blocks%to_blocks(comm, state, block)
       if (rows%n_rows == 0_lp) call file%write('/frames/start', 0_lp, error, '1', &
          'frame k owns the rows start[k] to start[k + 1] - 1', rows=one_row)
       rows%n_rows = rows%n_rows + blocks%total
@@ -149,23 +142,7 @@ contains
       call file%write('/frames/step', step, error, '1', 'number of the time step', rows=one_row)
       call file%write('/frames/time', time, error, 's', 'simulated time', rows=one_row)
       call file%write('/frames/id', int(ids(1, :), ip), error, '1', 'identifiers of the bodies', part, rows=many_rows)
-      call file%write('/frames/position', vector(block, 1), error, 'm', 'centres of mass', part, rows=many_rows)
-      call file%write('/frames/angle', component(block, 3), error, 'rad', 'angles since the start, anticlockwise', &
-                      part, rows=many_rows)
-      call file%write('/frames/velocity', vector(block, 4), error, 'm/s', 'velocities of the centres of mass', part, &
-                      rows=many_rows)
-      call file%write('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
-                      'angular velocities, anticlockwise', part, rows=many_rows)
-      if (.not. allocated(bodies%image)) return
-      call blocks%to_blocks(comm, transpose(int(bodies%image, lp)), images)
-      call file%write('/frames/image', int(images, ip), error, '1', &
-                      'cells crossed: position + image*size is the path without the cell', part, rows=many_rows)
-      if (.not. allocated(bodies%slid)) return
-      call blocks%to_blocks(comm, reshape(real(bodies%slid, dp), [1_ip, bodies%n]), block)
-      call file%write('/frames/slid', component(block, 1), error, 'm', &
-                      'shifts of the crossed borders, to be added to this path along x', part, rows=many_rows)
-      call file%write('/frames/shift', real(bodies%cell%shift, dp), error, 'm', &
-                      'displacement of the copy of the cell above along x', rows=one_row)
+      call write_poses(file, comm, bodies, blocks, many_rows, error)
    end subroutine add_ragged_frame
 
 end module polydem_ragged_segment

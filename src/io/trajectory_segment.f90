@@ -25,6 +25,7 @@ module polydem_trajectory_segment
    use polydem_communicator, only: communicator_t
    use polydem_contacts, only: contact_force, contacts_t
    use polydem_errors, only: error_t
+   use polydem_frame_poses, only: write_poses
    use polydem_row_distribution, only: component, row_distribution_t, vector
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
    use polydem_kinds, only: bp, dp, ip, lp
@@ -177,41 +178,11 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(error_t), allocatable, intent(inout) :: error
       type(row_distribution_t) :: blocks
-      type(part_t) :: part
-      real(dp), allocatable :: state(:, :), block(:, :)
-      integer(lp), allocatable :: images(:, :)
-      integer(ip) :: s
 
-      allocate (state(6, bodies%n))
-      do s = 1_ip, bodies%n
-         state(1:2, s) = real(bodies%position(:, s), dp)
-         state(3, s) = real(bodies%angle(s), dp)
-         state(4:5, s) = real(bodies%velocity(:, s), dp)
-         state(6, s) = real(bodies%angular_velocity(s), dp)
-      end do
       call order_bodies(comm, bodies, blocks)
-      call blocks%to_blocks(comm, state, block)
-      deallocate (state)
-      part = part_t(blocks%first, blocks%total)
       call file%write('/frames/step', step, error, '1', 'number of the time step', rows=one_row)
       call file%write('/frames/time', time, error, 's', 'simulated time', rows=one_row)
-      call file%write('/frames/position', vector(block, 1), error, 'm', 'centres of mass', part, rows=one_row)
-      call file%write('/frames/angle', component(block, 3), error, 'rad', 'angles since the start, anticlockwise', &
-                      part, rows=one_row)
-      call file%write('/frames/velocity', vector(block, 4), error, 'm/s', 'velocities of the centres of mass', part, &
-                      rows=one_row)
-      call file%write('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
-                      'angular velocities, anticlockwise', part, rows=one_row)
-      if (.not. allocated(bodies%image)) return
-      call blocks%to_blocks(comm, transpose(int(bodies%image, lp)), images)
-      call file%write('/frames/image', int(images, ip), error, '1', &
-                      'cells crossed: position + image*size is the path without the cell', part, rows=one_row)
-      if (.not. allocated(bodies%slid)) return
-      call blocks%to_blocks(comm, reshape(real(bodies%slid, dp), [1_ip, bodies%n]), block)
-      call file%write('/frames/slid', component(block, 1), error, 'm', &
-                      'shifts of the crossed borders, to be added to this path along x', part, rows=one_row)
-      call file%write('/frames/shift', real(bodies%cell%shift, dp), error, 'm', &
-                      'displacement of the copy of the cell above along x', rows=one_row)
+      call write_poses(file, comm, bodies, blocks, one_row, error)
    end subroutine add_frame
 
    !> Add the forces and torques on the fixed bodies, if there are any.

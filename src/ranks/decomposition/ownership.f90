@@ -132,19 +132,9 @@ contains
       integer(ip), intent(in) :: first(:), second(:)
       !> Destination of each row
       type(row_distribution_t), intent(inout) :: blocks
-      integer(lp), allocatable :: key(:)
-      integer(ip), allocatable :: slot(:)
-      integer(ip) :: k, n
 
-      allocate (key(size(first)), slot(size(first)))
-      n = 0_ip
-      do k = 1_ip, size(first, kind=ip)
-         if (.not. owns_pair(bodies, first(k), second(k))) cycle
-         n = n + 1_ip
-         key(n) = pair_key(bodies%global_index(first(k)), bodies%global_index(second(k)))
-         slot(n) = k
-      end do
-      call blocks%lay_out(comm, bodies%n_all, key(:n), slot(:n))
+      call lay_out_pairs(comm, bodies, first, second, bodies%global_index(first), bodies%global_index(second), &
+                         bodies%n_all, blocks)
    end subroutine order_pairs
 
    !> Find the global order of columns over pairs of pieces, of which not both bodies are fixed. Collective.
@@ -155,19 +145,17 @@ contains
       integer(ip), intent(in) :: first(:), second(:)
       !> Destination of each row
       type(row_distribution_t), intent(inout) :: blocks
-      integer(lp), allocatable :: key(:)
-      integer(ip), allocatable :: slot(:)
-      integer(ip) :: k, n
+      integer(ip), allocatable :: body(:, :), place(:, :)
+      integer(ip) :: k
 
-      allocate (key(size(first)), slot(size(first)))
-      n = 0_ip
+      allocate (body(size(first), 2), place(size(first), 2))
       do k = 1_ip, size(first, kind=ip)
-         if (.not. owns_pair(bodies, bodies%pieces%body_of(first(k)), bodies%pieces%body_of(second(k)))) cycle
-         n = n + 1_ip
-         key(n) = pair_key(place_of(first(k)), place_of(second(k)))
-         slot(n) = k
+         body(k, 1) = bodies%pieces%body_of(first(k))
+         body(k, 2) = bodies%pieces%body_of(second(k))
+         place(k, :) = [place_of(first(k)), place_of(second(k))]
       end do
-      call blocks%lay_out(comm, bodies%n_all*bodies%pieces%most, key(:n), slot(:n))
+      call lay_out_pairs(comm, bodies, body(:, 1), body(:, 2), place(:, 1), place(:, 2), &
+                         bodies%n_all*bodies%pieces%most, blocks)
 
    contains
 
@@ -181,5 +169,29 @@ contains
       end function place_of
 
    end subroutine order_pieces
+
+   !> Find the global order of pairs from the places of their two members among all. Collective.
+   subroutine lay_out_pairs(comm, bodies, first, second, first_place, second_place, n_places, blocks)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the two bodies of each pair
+      integer(ip), intent(in) :: first(:), second(:)
+      !> Places of the two members of each pair, in ascending order, and number of places
+      integer(ip), intent(in) :: first_place(:), second_place(:), n_places
+      type(row_distribution_t), intent(inout) :: blocks
+      integer(lp), allocatable :: key(:)
+      integer(ip), allocatable :: row(:)
+      integer(ip) :: k, n
+
+      allocate (key(size(first)), row(size(first)))
+      n = 0_ip
+      do k = 1_ip, size(first, kind=ip)
+         if (.not. owns_pair(bodies, first(k), second(k))) cycle
+         n = n + 1_ip
+         key(n) = pair_key(first_place(k), second_place(k))
+         row(n) = k
+      end do
+      call blocks%lay_out(comm, n_places, key(:n), row(:n))
+   end subroutine lay_out_pairs
 
 end module polydem_ownership
