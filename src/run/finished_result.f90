@@ -3,6 +3,8 @@ module polydem_finished_result
    use polydem_changed_entries, only: changed_entries
    use polydem_checked_files, only: check_closed
    use polydem_errors, only: error_t
+   use polydem_folder_lock, only: lock_path
+   use polydem_folders, only: link_exists
    use polydem_kinds, only: lp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_hash
@@ -37,8 +39,8 @@ contains
       may_be_finished = found(1) == 1_lp
    end function may_be_finished
 
-   !> Check on the root rank whether the folder holds the finished result of this run. No file changes. Collective; all
-   !> ranks get the same error.
+   !> Check on the root rank whether the folder holds the finished result of this run. Nothing changes but what a run
+   !> left behind that ended while it wrote its last checkpoint. Collective; all ranks get the same error.
    subroutine find_finished_result(settings, run, last_state, error)
       type(settings_t), intent(in) :: settings
       !> The run; its manifest is read, and its simulation built if needed
@@ -53,8 +55,24 @@ contains
       if (allocated(error)) return
       if (run%comm%is_root()) call find_finished(run%folder, settings, run%scene_hash, run%manifest, &
                                                   last_state, error)
+      if (allocated(last_state) .and. .not. allocated(error)) call remove_remains(run, error)
       call run%comm%all_reduce_error(error)
    end subroutine find_finished_result
+
+   !> Remove lock and unfinished files of a run that is dead; nothing happens if it released its lock.
+   subroutine remove_remains(run, error)
+      type(run_t), intent(inout) :: run
+      !> Allocated if the run still lives, or if a file cannot be removed
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: note
+
+      if (.not. link_exists(lock_path(run%folder), error)) return
+      call run%lock%acquire(run%folder, note, error)
+      if (allocated(error)) return
+      call run%manifest%continue_writing()
+      call run%manifest%remove_unfinished(error)
+      call run%lock%release()
+   end subroutine remove_remains
 
    !> Find the finished result of the same settings and initial bodies.
    subroutine find_finished(folder, settings, scene, manifest, last_state, error)

@@ -311,9 +311,7 @@ contains
       integer :: k
 
       call manifest%remove_file(folder//'/'//profile_name, error)
-      do k = 1, manifest%n
-         if (.not. allocated(error)) call manifest%remove_file(trim(manifest%entry(k)%name), error, stays=.true.)
-      end do
+      call manifest%remove_unfinished(error)
       do number = earlier%segments + earlier%surplus, earlier%segments + 1_ip, -1_ip
          call manifest%remove_file(segment_path(folder, number), error)
          call manifest%remove_entry(segment_path(folder, number), error)

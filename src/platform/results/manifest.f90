@@ -80,6 +80,7 @@ module polydem_manifest
       procedure :: reopen
       procedure :: close_file
       procedure :: remove_file => remove_forms
+      procedure :: remove_unfinished
       procedure :: remove_entry
    end type manifest_t
 
@@ -361,6 +362,17 @@ contains
          call remove_file(self%folder//'/'//trim(forms(k)), error)
       end do
    end subroutine remove_forms
+
+   !> Remove the unfinished forms of all files of the list.
+   subroutine remove_unfinished(self, error)
+      class(manifest_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      do k = 1, self%n
+         if (.not. allocated(error)) call self%remove_file(trim(self%entry(k)%name), error, stays=.true.)
+      end do
+   end subroutine remove_unfinished
 
    !> Remove a name from the result. A file of this name no longer belongs to the result.
    subroutine remove_entry(self, path, error)
