@@ -9,7 +9,7 @@ program polydem
    use polydem_kinds, only: ip
    use polydem_posix_processes, only: c_exit
    use polydem_process_limits, only: check_stack
-   use polydem_screen, only: warn
+   use polydem_console, only: warn
    use polydem_signals, only: hold_usr1, ignore_write_signals
    use polydem_standard_streams, only: open_closed_streams
    use polydem_verbs, only: execute

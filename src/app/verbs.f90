@@ -18,7 +18,7 @@ module polydem_verbs
    use polydem_result_info, only: describe_program, describe_result
    use polydem_run, only: run_options_t
    use polydem_run_simulation, only: run_simulation
-   use polydem_screen, only: print_line, warn
+   use polydem_console, only: print_line, warn
    use polydem_settings, only: bench_settings_t, settings_t
    use polydem_signals, only: release_signals
    use polydem_thread_choice, only: thread_choice_t

@@ -30,7 +30,7 @@ module polydem_contact_history
    !> Contact history of all pairs
    type :: contact_history_t
       !> What the search for overlaps remembers of each pair, 0 nothing. It saves time and changes no result
-      integer(ip), allocatable :: memory(:)
+      integer(ip), allocatable :: features(:)
       !> Columns: those of the force law in the order of its parts, then those of the guards; not allocated if there is
       !> none
       type(history_column_t), allocatable :: column(:)

@@ -1,6 +1,6 @@
 !> Contacts that one thread has collected from its blocks, and their union in one table.
 !>
-!> Threads walk over ranges of pairs in descending order. The table is in ascending order.
+!> Threads run over ranges of pairs in descending order. The table is in ascending order.
 module polydem_contact_rows
    use polydem_contact_block, only: contact_block_t, store_contact, store_forces
    use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, reserve_contacts

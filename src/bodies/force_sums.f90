@@ -4,8 +4,8 @@
 !> because its line of action may miss the centroid, and `twist`, the contact's own torque. The second body feels the
 !> opposite force and torques.
 !>
-!> Each body sums over its contacts in descending order of the partner's identifier. A walk over all contacts in
-!> descending order adds them in this order. So does every thread that walks over a range of contacts and keeps the
+!> Each body sums over its contacts in descending order of the partner's identifier. A loop over all contacts in
+!> descending order adds them in this order. So does every thread that runs over a range of contacts and keeps the
 !> terms of bodies beyond its range: they follow those of the range itself, in descending order of the ranges. The sums
 !> therefore have the same bits for any number of threads and ranks, and need no index from bodies to contacts.
 module polydem_force_sums

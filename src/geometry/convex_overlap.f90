@@ -24,7 +24,7 @@ contains
    !> A lens that is not certified often lasts for many steps, for example where equal squares rest on each other. The
    !> caller may remember it as `rejected`. While the polygons cross there, a search can find no other lens, and only
    !> clipping remains.
-   pure subroutine find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory, rejected)
+   pure subroutine find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, features, rejected)
       !> Vertices of P and of Q, anticlockwise, each relative to its own centre, which is inside, (2, n) and (2, m) [m]
       real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
@@ -36,7 +36,7 @@ contains
       !> The overlap; a is P, b is Q
       type(overlap_t), intent(out) :: overlap
       !> What to remember: a certified lens (positive), a separating edge (negative), or nothing (0)
-      integer(ip), intent(out) :: memory
+      integer(ip), intent(out) :: features
       !> A lens that the kernel has not certified for these polygons, or 0; on return the one that it does not certify
       integer(ip), intent(inout) :: rejected
       logical :: certified, searched
@@ -45,25 +45,25 @@ contains
       if (rejected > 0_ip) searched = .not. cross_at(p, q, offset, radius_p, radius_q, rejected)
       if (searched) then
          rejected = 0_ip
-         call search_pair(p, q, offset, radius_p, radius_q, memory)
-         if (memory < 0_ip) return
-         if (memory > 0_ip) then
-            call evaluate_lens(p, q, offset, radius_p, radius_q, effective, memory, overlap, certified)
+         call search_pair(p, q, offset, radius_p, radius_q, features)
+         if (features < 0_ip) return
+         if (features > 0_ip) then
+            call evaluate_lens(p, q, offset, radius_p, radius_q, effective, features, overlap, certified)
             if (certified) return
-            rejected = memory
+            rejected = features
          end if
       end if
       call clip_overlap(p, q, offset, radius_p, radius_q, effective, overlap)
-      memory = remembered_edge(p, q, overlap%separating_edge)
+      features = remembered_edge(p, q, overlap%separating_edge)
    end subroutine find_overlap
 
    !> Evaluate one lens.
-   pure subroutine evaluate_lens(p, q, offset, radius_p, radius_q, effective, memory, overlap, certified)
+   pure subroutine evaluate_lens(p, q, offset, radius_p, radius_q, effective, features, overlap, certified)
       real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       real(wp), intent(in) :: offset(2), radius_p, radius_q
       logical, intent(in) :: effective
       !> The lens
-      integer(ip), intent(in) :: memory
+      integer(ip), intent(in) :: features
       !> The overlap; not changed if it is not certified
       type(overlap_t), intent(inout) :: overlap
       logical, intent(out) :: certified
@@ -76,7 +76,7 @@ contains
       m = size(q, 2, kind=ip)
       vertices(:, 1:n) = p
       vertices(:, n + 1_ip:n + m) = q
-      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], offset, radius_p, radius_q)
+      call add_lane(batch, 1_ip, features, [1_ip, n, n + 1_ip, n + m], offset, radius_p, radius_q)
       call evaluate_batch(batch, 1_ip, vertices(:, 1:n + m), effective, isa_base, columns)
       certified = batch%certified(1) > 0.0_wp
       if (.not. certified) return
@@ -124,15 +124,15 @@ contains
       integer(ip), intent(in) :: separating_edge
       logical, intent(in) :: effective
       type(overlap_t), intent(out) :: overlap
-      integer(ip) :: memory, rejected, edge, corner
+      integer(ip) :: features, rejected, edge, corner
       logical :: apart, of_q
 
-      memory = remembered_edge(p, q, separating_edge)
-      call test_separation(p, q, offset, radius_p, memory, apart)
+      features = remembered_edge(p, q, separating_edge)
+      call test_separation(p, q, offset, radius_p, features, apart)
       rejected = 0_ip
-      if (.not. apart) call find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory, rejected)
-      if (memory >= 0_ip) return
-      call unpack_edge(memory, of_q, edge, corner)
+      if (.not. apart) call find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, features, rejected)
+      if (features >= 0_ip) return
+      call unpack_edge(features, of_q, edge, corner)
       overlap%separating_edge = merge(-edge - 1_ip, edge + 1_ip, of_q)
    end subroutine overlap_in_roles
 

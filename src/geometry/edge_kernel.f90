@@ -55,7 +55,7 @@ contains
 
       do i = 1_ip, n
          ! As in `unpack_edge`. If the edge is one of Q, P and Q change places.
-         packed = not(batch%memory(i))
+         packed = not(batch%features(i))
          edge = iand(shiftr(packed, 1), mask)
          corner = iand(shiftr(packed, 1 + edge_bits), mask)
          of_q(i) = real(iand(packed, 1_ip), wp)

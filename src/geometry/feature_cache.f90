@@ -41,17 +41,17 @@ contains
    end function packed_edge
 
    !> The separating edge.
-   pure subroutine unpack_edge(memory, of_q, edge, corner)
+   pure subroutine unpack_edge(features, of_q, edge, corner)
       !> A negative number
-      integer(ip), intent(in) :: memory
+      integer(ip), intent(in) :: features
       !> Whether the edge is one of Q
       logical, intent(out) :: of_q
       !> The edge, and the nearest corner of the other polygon
       integer(ip), intent(out) :: edge, corner
 
-      of_q = .not. btest(memory, 0)
-      edge = ibits(not(memory), 1, edge_bits)
-      corner = ibits(not(memory), 1 + edge_bits, edge_bits)
+      of_q = .not. btest(features, 0)
+      edge = ibits(not(features), 1, edge_bits)
+      corner = ibits(not(features), 1 + edge_bits, edge_bits)
    end subroutine unpack_edge
 
 end module polydem_feature_cache

@@ -82,17 +82,17 @@ contains
       integer(ip) :: i, edge(4), inside_p, inside_q, possible
 
       do i = 1_ip, n
-         edge(1) = iand(batch%memory(i), mask)
-         edge(2) = iand(shiftr(batch%memory(i), lens_bits), mask)
-         edge(3) = iand(shiftr(batch%memory(i), 2*lens_bits), mask)
-         edge(4) = iand(shiftr(batch%memory(i), 3*lens_bits), mask)
+         edge(1) = iand(batch%features(i), mask)
+         edge(2) = iand(shiftr(batch%features(i), lens_bits), mask)
+         edge(3) = iand(shiftr(batch%features(i), 2*lens_bits), mask)
+         edge(4) = iand(shiftr(batch%features(i), 3*lens_bits), mask)
          inside_p = edge(2) - edge(1)
          inside_p = inside_p + iand(shifta(inside_p, 31), batch%corners(i, 1))
          inside_q = edge(4) - edge(3)
          inside_q = inside_q + iand(shifta(inside_q, 31), batch%corners(i, 2))
          ! A lens has edges that exist, and at most two corners of each body inside the other. The search without
          ! memory leaves polygons with more corners than can be remembered to clipping.
-         possible = iand(not(shifta(batch%memory(i), 31)), less(max(inside_p, inside_q), 3_ip))
+         possible = iand(not(shifta(batch%features(i), 31)), less(max(inside_p, inside_q), 3_ip))
          possible = iand(possible, iand(less(max(edge(1), edge(2)), batch%corners(i, 1)), &
                                         less(max(edge(3), edge(4)), batch%corners(i, 2))))
          possible = iand(possible, less(max(batch%corners(i, 1), batch%corners(i, 2)), most_lens_corners + 1_ip))

@@ -35,7 +35,7 @@ contains
    !> each polygon between them. It is not certified yet. Every lens that the kernel certifies is found, since both
    !> compute the same signs, and it has no other crossings. Edges of Q with a vertex that is not near are left out:
    !> no certified lens has them, and their signs are not certain. Complexity: O(n m) for n and m vertices
-   pure subroutine search_pair(p, q, offset, radius_p, radius_q, memory)
+   pure subroutine search_pair(p, q, offset, radius_p, radius_q, features)
       !> Vertices of P and of Q, anticlockwise, each relative to its own centre, (2, n) and (2, m) [m]
       real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
@@ -43,13 +43,13 @@ contains
       !> Radii of P and of Q, that of P not greater than that of Q [m]
       real(wp), intent(in) :: radius_p, radius_q
       !> What to remember
-      integer(ip), intent(out) :: memory
+      integer(ip), intent(out) :: features
       type(placed_t) :: placed_p, placed_q
       type(crossings_t) :: found
       real(wp) :: half, centre_p(2)
       integer(ip) :: j
 
-      memory = 0_ip
+      features = 0_ip
       if (max(size(p, 2), size(q, 2)) > most_lens_corners) return
       half = merge(0.0_wp, 0.5_wp, radius_p < radius_q)
       centre_p = -half*offset
@@ -59,14 +59,14 @@ contains
 
       do j = 1_ip, placed_q%n
          if (.not. (placed_q%near(j) .and. placed_q%near(j + 1_ip))) cycle
-         call cross_line(placed_p, placed_q, j, radius_p, found, memory)
-         if (memory /= 0_ip) return
+         call cross_line(placed_p, placed_q, j, radius_p, found, features)
+         if (features /= 0_ip) return
       end do
       if (found%entering == 1_ip .and. found%leaving == 1_ip) then
          if (modulo(found%edges(2) - found%edges(1), placed_p%n) <= 2_ip .and. &
-             modulo(found%edges(4) - found%edges(3), placed_q%n) <= 2_ip) memory = packed_lens(found%edges)
+             modulo(found%edges(4) - found%edges(3), placed_q%n) <= 2_ip) features = packed_lens(found%edges)
       else if (found%entering + found%leaving == 0_ip .and. all(placed_q%near(1:placed_q%n))) then
-         call find_separating_edge(placed_p, placed_q, radius_p, memory)
+         call find_separating_edge(placed_p, placed_q, radius_p, features)
       end if
    end subroutine search_pair
 
@@ -138,7 +138,7 @@ contains
    end subroutine place
 
    !> Find the proper crossings of an edge of Q with the edges of P, or that it surely separates the polygons.
-   pure subroutine cross_line(p, q, j, s, found, memory)
+   pure subroutine cross_line(p, q, j, s, found, features)
       type(placed_t), intent(in) :: p, q
       !> The edge of Q
       integer(ip), intent(in) :: j
@@ -146,7 +146,7 @@ contains
       real(wp), intent(in) :: s
       type(crossings_t), intent(inout) :: found
       !> The separating edge; not changed if it does not separate
-      integer(ip), intent(inout) :: memory
+      integer(ip), intent(inout) :: features
       real(wp) :: depth(most_lens_corners + 1_ip), length, highest
       integer(ip) :: i
 
@@ -157,7 +157,7 @@ contains
          highest = max(highest, depth(i))
       end do
       if (highest < -surely_apart*s*length) then
-         memory = packed_edge(.true., j - 1_ip, int(maxloc(depth(1:p%n), dim=1), ip) - 1_ip)
+         features = packed_edge(.true., j - 1_ip, int(maxloc(depth(1:p%n), dim=1), ip) - 1_ip)
          return
       end if
       do i = 1_ip, p%n
@@ -193,12 +193,12 @@ contains
    end function enters
 
    !> Find the first edge of P that surely separates it from Q; all vertices must be near.
-   pure subroutine find_separating_edge(p, q, s, memory)
+   pure subroutine find_separating_edge(p, q, s, features)
       type(placed_t), intent(in) :: p, q
       !> Radius of P [m]
       real(wp), intent(in) :: s
       !> The separating edge; not changed if there is none
-      integer(ip), intent(inout) :: memory
+      integer(ip), intent(inout) :: features
       real(wp) :: depth, highest
       integer(ip) :: i, j, nearest
 
@@ -211,7 +211,7 @@ contains
             highest = max(highest, depth)
          end do
          if (highest < -surely_apart*s*(abs(p%edge(1, i)) + abs(p%edge(2, i)))) then
-            memory = packed_edge(.false., i - 1_ip, nearest - 1_ip)
+            features = packed_edge(.false., i - 1_ip, nearest - 1_ip)
             return
          end if
       end do

@@ -33,7 +33,7 @@ module polydem_overlap_batch
    !> A batch of pairs, one lane each. Its numbers are not initialised. Last indices (2) are P and Q.
    type :: overlap_batch_t
       !> What is remembered, see `polydem_feature_cache`; any integer
-      integer(ip) :: memory(column_length)
+      integer(ip) :: features(column_length)
       !> Places of the first vertices in the array of vertices that `evaluate_batch` gets
       integer(ip) :: start(column_length, 2)
       !> Numbers of vertices
@@ -51,12 +51,12 @@ module polydem_overlap_batch
 contains
 
    !> Write a pair into a lane.
-   pure subroutine add_lane(batch, lane, memory, vertices, offset, radius_p, radius_q)
+   pure subroutine add_lane(batch, lane, features, vertices, offset, radius_p, radius_q)
       type(overlap_batch_t), intent(inout) :: batch
       !> The lane, from 1
       integer(ip), intent(in) :: lane
       !> What is remembered
-      integer(ip), intent(in) :: memory
+      integer(ip), intent(in) :: features
       !> Places of the first and the last vertex of P and of Q in the array of vertices that `evaluate_batch` gets
       integer(ip), intent(in) :: vertices(4)
       !> Centre of Q minus centre of P [m]
@@ -64,7 +64,7 @@ contains
       !> Radii of P and of Q, that of P not greater than that of Q [m]
       real(wp), intent(in) :: radius_p, radius_q
 
-      batch%memory(lane) = memory
+      batch%features(lane) = features
       batch%start(lane, :) = vertices([1, 3])
       batch%corners(lane, :) = vertices([2, 4]) - vertices([1, 3]) + 1_ip
       batch%offset(lane, :) = offset

@@ -89,13 +89,13 @@ contains
          integer(ip), intent(in) :: i, j
          type(overlap_t) :: overlap
          real(wp), allocatable :: a(:, :), b(:, :)
-         integer(ip) :: memory, rejected
+         integer(ip) :: features, rejected
 
          a = joined(:, ends(i - 1_ip) + 1_ip:ends(i)) - spread(centres(:, i), 2, ends(i) - ends(i - 1_ip))
          b = joined(:, ends(j - 1_ip) + 1_ip:ends(j)) - spread(centres(:, j), 2, ends(j) - ends(j - 1_ip))
          rejected = 0_ip
          call find_overlap(a, b, centres(:, j) - centres(:, i), greatest_radius(a), greatest_radius(b), .false., &
-                           overlap, memory, rejected)
+                           overlap, features, rejected)
          common = overlap%area
       end function overlap_of
 

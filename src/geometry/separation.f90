@@ -60,7 +60,7 @@ contains
          if (apart(i)) cycle
          associate (from => batch%start(i, :), to => batch%start(i, :) + batch%corners(i, :) - 1_ip)
             call test_separation(turned(:, from(1):to(1)), turned(:, from(2):to(2)), batch%offset(i, :), &
-                                 batch%radius(i, 1), batch%memory(i), apart(i))
+                                 batch%radius(i, 1), batch%features(i), apart(i))
          end associate
       end do
    end subroutine test_edges
@@ -71,7 +71,7 @@ contains
    !> corner is nearer then. Otherwise all corners are tested. If the answer is yes, exact arithmetic finds the
    !> polygons apart, no lens is certified, and general clipping finds no overlap. So the answer saves time and
    !> changes no result.
-   pure subroutine test_separation(p, q, offset, radius_p, memory, apart)
+   pure subroutine test_separation(p, q, offset, radius_p, features, apart)
       !> Vertices of P and of Q, anticlockwise, each relative to its own centre, (2, n) and (2, m) [m]
       real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
@@ -79,15 +79,15 @@ contains
       !> Radius of P, not greater than that of Q [m]
       real(wp), intent(in) :: radius_p
       !> What is remembered, any integer; the corner is brought up to date
-      integer(ip), intent(inout) :: memory
+      integer(ip), intent(inout) :: features
       !> Whether the polygons are apart; false if no edge is remembered
       logical, intent(out) :: apart
       integer(ip) :: edge, corner
       logical :: of_q
 
       apart = .false.
-      if (memory >= 0_ip) return
-      call unpack_edge(memory, of_q, edge, corner)
+      if (features >= 0_ip) return
+      call unpack_edge(features, of_q, edge, corner)
       if (of_q) then
          if (edge >= size(q, 2) .or. corner >= size(p, 2)) return
          call test_line(line_of(q, edge + 1_ip, -offset, offset, radius_p), p, corner, apart)
@@ -95,7 +95,7 @@ contains
          if (edge >= size(p, 2) .or. corner >= size(q, 2)) return
          call test_line(line_of(p, edge + 1_ip, offset, [0.0_wp, 0.0_wp], radius_p), q, corner, apart)
       end if
-      if (apart) memory = packed_edge(of_q, edge, corner)
+      if (apart) features = packed_edge(of_q, edge, corner)
    end subroutine test_separation
 
    !> Line of an edge of polygon A, for depths of corners of polygon B.

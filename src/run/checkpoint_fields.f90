@@ -234,7 +234,7 @@ contains
       n_columns = 0
       if (allocated(history%column)) n_columns = size(history%column)
       allocate (packed%key(n), source=0_lp)
-      allocate (packed%memory(n), source=0_ip)
+      allocate (packed%features(n), source=0_ip)
       allocate (packed%value(max(1, n_columns), n), source=0.0_wp)
    end subroutine resize
 

@@ -151,7 +151,7 @@ contains
 
       if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
-         call complete_wall_forces(run%comm, s%walk%walls, s%bodies)
+         call complete_wall_forces(run%comm, s%loop%walls, s%bodies)
          if (allocated(s%traffic)) then
             call s%traffic%departures%drop_rows(run%earlier%last_frame)
             if (output%contacts) then

@@ -16,7 +16,7 @@ contains
       type(simulation_t), intent(inout) :: self
 
       call set_sample_columns(self, self%series%row)
-      call self%record%set_columns(self%comm, self%dt, self%named, self%bodies, self%walk%walls, self%series%row)
+      call self%record%set_columns(self%comm, self%dt, self%named, self%bodies, self%loop%walls, self%series%row)
       if (allocated(self%loads)) call set_load_columns(self%loads, self%dt, self%series%row)
       if (allocated(self%traffic)) call self%traffic%set_columns(self%series%row)
    end subroutine collect_row

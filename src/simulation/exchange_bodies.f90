@@ -100,14 +100,14 @@ contains
       integer(ip) :: c
 
       if (.not. allocated(self%traffic)) return
-      if (self%walk%step /= self%step .or. .not. self%settings%output%energy_balance) return
+      if (self%loop%step /= self%step .or. .not. self%settings%output%energy_balance) return
       if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
       call list_departures(self, departing, kept)
       if (size(departing%id) == 0) return
       call find_leaving_totals(self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, &
-                               self%force_sums, self%walk%walls, .not. kept, total)
+                               self%force_sums, self%loop%walls, .not. kept, total)
       associate (contacts => self%contacts, bodies => self%bodies)
-         if (self%walk%walls%energy_is_known) then
+         if (self%loop%walls%energy_is_known) then
             do c = 1_ip, contacts%n
                if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
                if (stays(contacts%first(c)) .and. stays(contacts%second(c))) cycle

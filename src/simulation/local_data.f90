@@ -38,18 +38,18 @@ contains
       call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
       if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
       call fit_table(self%law, self%contacts)
-      self%walk%walls%n = 0_ip
-      self%walk%walls%border%n = 0_ip
-      self%walk%walls%energy_is_known = self%law%energy_is_known
-      call fit_table(self%law, self%walk%flagged)
+      self%loop%walls%n = 0_ip
+      self%loop%walls%border%n = 0_ip
+      self%loop%walls%energy_is_known = self%law%energy_is_known
+      call fit_table(self%law, self%loop%flagged)
       self%n_contacts = 0_ip
-      self%walk%passing_pair = 0_ip
+      self%loop%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
       ! The border of a sheared cell acts on bodies that nothing touches.
       call self%flight%start(self%settings%forces%gravity, &
                              allocated(self%body_forces%list) .or. self%bodies%cell%is_sheared .or. &
                              self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
-      self%walk%incidence = incidence_t()
+      self%loop%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)
       associate (choice => self%settings%boxes)
@@ -59,9 +59,9 @@ contains
       if (allocated(error)) return
       call rebuild_neighbours(self, error)
       call allocate_history(self)
-      call new_flag_limits(self%walk%flag_limits, self%settings%guards, self%bodies, &
+      call new_flag_limits(self%loop%flag_limits, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
-      if (self%settings%guards%step /= 'off') self%walk%flag_limits%soft = &
+      if (self%settings%guards%step /= 'off') self%loop%flag_limits%soft = &
          stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
    end subroutine rebuild_local_data
 
@@ -123,7 +123,7 @@ contains
       integer :: k
 
       self%history = contact_history_t()
-      allocate (self%history%memory(0))
+      allocate (self%history%features(0))
       do k = 1, size(self%law%history_kinds)
          call add_column(self%history, self%law%history_kinds(k), 0_ip)
       end do

@@ -27,7 +27,7 @@ module polydem_simulation
    use polydem_wall_energy, only: add_loads
    use polydem_wall_load, only: energies_of_loads, wall_load_t
    use polydem_wall_record, only: wall_record_t
-   use polydem_walk_results, only: walk_results_t
+   use polydem_thread_results, only: loop_results_t
    implicit none
    private
    public :: simulation_t, former_direction, time_of, compute_balance
@@ -94,10 +94,10 @@ module polydem_simulation
       type(boxes_t) :: boxes
       !> Pairs of bodies whose boxes overlap
       type(neighbours_t) :: neighbours
-      !> Table of the contacts of this step; empty if the walk did not keep it
+      !> Table of the contacts of this step; empty if the loop did not keep it
       type(contacts_t) :: contacts
-      !> Results of the walk over the contacts of this step
-      type(walk_results_t) :: walk
+      !> Results of the loop over the contacts of this step
+      type(loop_results_t) :: loop
       !> Number of contacts that this rank owns
       integer(ip) :: n_contacts = 0_ip
       !> Sums of the contact forces on each body
@@ -161,7 +161,7 @@ contains
       type(balance_t), intent(out) :: balance
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
-                            self%force_sums, self%walk%walls, balance)
+                            self%force_sums, self%loop%walls, balance)
       if (allocated(self%loads)) call add_loads(self%energy_balance, energies_of_loads(self%loads, self%dt), balance)
    end subroutine compute_balance
 

@@ -60,10 +60,10 @@ contains
 
       share = 0.0_wp
       worst = 0_ip
-      associate (flagged => self%walk%flagged, bodies => self%bodies)
+      associate (flagged => self%loop%flagged, bodies => self%bodies)
          do c = 1_ip, flagged%n
             if (.not. flagged%length(c)*flagged%inverse_length(c)*(bodies%inverse_mass(flagged%first(c)) &
-                + bodies%inverse_mass(flagged%second(c))) > self%walk%flag_limits%soft) cycle
+                + bodies%inverse_mass(flagged%second(c))) > self%loop%flag_limits%soft) cycle
             this = self%dt/stable_step_alone(self%law, self%integrator%stability(), bodies, flagged, c)
             if (this <= share) cycle
             share = this
@@ -88,8 +88,8 @@ contains
       integer(ip) :: worst
 
       call find_stiffest(self, share, worst)
-      if (worst > 0_ip) call compare_step(self%bodies, self%walk%flagged, self%step, self%dt, self%dt/share, worst, &
-                                        remedy_text(self, self%walk%flagged, worst), warning, failure)
+      if (worst > 0_ip) call compare_step(self%bodies, self%loop%flagged, self%step, self%dt, self%dt/share, worst, &
+                                        remedy_text(self, self%loop%flagged, worst), warning, failure)
       if (allocated(failure)) warning = failure%message
       call self%comm%all_reduce_text(warning, real(share, dp))
       greatest = share
@@ -134,7 +134,7 @@ contains
       real(wp), allocatable :: numbers(:), yielding(:)
       real(wp) :: least(1)
 
-      numbers = contact_numbers(self%bodies%n, self%walk%incidence)
+      numbers = contact_numbers(self%bodies%n, self%loop%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
       if (allocated(self%loads)) yielding = wall_mobilities(self%loads, self%named, self%bodies)
       call stable_step_of_contacts(self%law, self%integrator%stability(), self%bodies, numbers, self%contacts, &

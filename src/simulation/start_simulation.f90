@@ -19,7 +19,7 @@ module polydem_start_simulation
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
    use polydem_local_data, only: limit_displacement, rebuild_local_data
-   use polydem_prediction, only: move_walls, yield_walls
+   use polydem_predict, only: move_walls, yield_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
    use polydem_settings, only: forces_settings_t, settings_t
@@ -111,9 +111,9 @@ contains
       call start_integration(self)
       if (allocated(self%loads)) call yield_walls(self, 0.0_wp)
       if (self%settings%output%series_interval > 0.0_wp) &
-         call self%record%start(self%named, self%bodies, self%walk%walls)
+         call self%record%start(self%named, self%bodies, self%loop%walls)
       if (self%settings%output%energy_balance) call start_energy_balance( &
-         self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%force_sums, self%walk%walls)
+         self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%force_sums, self%loop%walls)
       if (allocated(self%traffic)) call expect_changes(self%energy_balance)
       self%timers = timers_t()
    end subroutine start_forces

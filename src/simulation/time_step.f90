@@ -5,14 +5,14 @@ module polydem_time_step
    use polydem_box_images, only: place_images
    use polydem_box_maker, only: turn_and_bound
    use polydem_boxes_within, only: have_boxes_within
-   use polydem_completion, only: complete_step
-   use polydem_contact_walk, only: walk_contacts
+   use polydem_complete, only: complete_step
+   use polydem_contact_loop, only: loop_over_contacts
    use polydem_energy_balance, only: begin_step
    use polydem_errors, only: error_t, raise, run_error
    use polydem_exchange_bodies, only: exchange_bodies
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
-   use polydem_prediction, only: predict_bodies, predict_border, yield_walls
+   use polydem_predict, only: predict_bodies, predict_border, yield_walls
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
    use polydem_strings, only: to_text
@@ -67,7 +67,7 @@ contains
          if (allocated(error)) return
          call find_pairs(self, error)
          call timers%lap(stage_neighbours)
-         call walk_contacts(self, self%dt, needs_table(self, tabulate), clock, error)
+         call loop_over_contacts(self, self%dt, needs_table(self, tabulate), clock, error)
          call timers%divide_lap(stage_overlap, stage_forces, clock)
          call add_other_forces(self, error)
          call timers%lap(stage_forces)
@@ -125,7 +125,7 @@ contains
       end associate
    end subroutine find_pairs
 
-   !> Whether the walk over the contacts keeps the table of all contacts: for the caller, or for a constraint
+   !> Whether the loop over the contacts keeps the table of all contacts: for the caller, or for a constraint
    pure logical function needs_table(self, tabulate)
       type(simulation_t), intent(in) :: self
       !> Whether the caller needs it; absent: yes
@@ -148,11 +148,11 @@ contains
       call self%body_forces%apply(self%bodies, self%force_sums)
       if (.not. allocated(self%law%constraint)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
-      call self%law%constraint%apply(self%dt, self%walk%incidence, self%bodies, self%contacts, self%history, error)
+      call self%law%constraint%apply(self%dt, self%loop%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
       call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
       call self%body_forces%apply(self%bodies, self%force_sums)
-      call select_walls(self%bodies, self%contacts, self%walk%walls)
+      call select_walls(self%bodies, self%contacts, self%loop%walls)
    end subroutine add_other_forces
 
    !> Compute the forces on the bodies at time 0 from their boxes.
@@ -164,7 +164,7 @@ contains
       type(block_clock_t) :: clock
 
       call find_pairs(self, error)
-      call walk_contacts(self, 0.0_wp, needs_table(self), clock, error)
+      call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, error)
       call add_other_forces(self, error)
       if (allocated(error)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
@@ -181,17 +181,17 @@ contains
       integer(ip) :: k
 
       ! The finder of one rank may have failed, after which the others found their contacts.
-      has_none = merge(1_lp, 0_lp, self%walk%step /= self%step)
+      has_none = merge(1_lp, 0_lp, self%loop%step /= self%step)
       call self%comm%all_reduce_max(has_none)
       if (has_none(1) == 1_lp) then
          self%contacts%n = 0_ip
          return
       end if
-      if (self%settings%output%contacts .and. .not. self%walk%has_table) then
+      if (self%settings%output%contacts .and. .not. self%loop%has_table) then
          ! The end of the step changed velocities, and poses with some integrators.
          if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
          call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
-         call walk_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
+         call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
          call add_other_forces(self, known_error)
       end if
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
@@ -203,7 +203,7 @@ contains
       integer :: k
 
       associate (pairs => self%neighbours%pairs, history => self%history)
-         call pairs%carry(history%memory, 0_ip)
+         call pairs%carry(history%features, 0_ip)
          if (.not. allocated(history%column)) return
          do k = 1, size(history%column)
             call pairs%carry(history%column(k)%value, 0.0_wp)

@@ -46,11 +46,11 @@ contains
       logical, allocatable :: leaves(:)
       integer(ip) :: c, w
 
-      if (.not. self%named%has_gates() .or. self%walk%step /= self%step) return
+      if (.not. self%named%has_gates() .or. self%loop%step /= self%step) return
       self%named%released = 0.0_wp
       leaves = self%named%vanishing(time_of(self))
-      if (.not. any(leaves) .or. .not. self%walk%walls%energy_is_known) return
-      associate (terms => self%walk%walls)
+      if (.not. any(leaves) .or. .not. self%loop%walls%energy_is_known) return
+      associate (terms => self%loop%walls)
          do c = 1_ip, terms%n
             w = self%named%wall_of(terms%slots(1, c))
             if (w == 0_ip) cycle

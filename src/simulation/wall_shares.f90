@@ -11,7 +11,7 @@
 !> directions, has the share 1.
 !>
 !> The shares are those of the present step, so nothing is remembered. The contacts in question are few: their overlaps
-!> are found here, before the walk over all contacts finds them again.
+!> are found here, before the loop over all contacts finds them again.
 module polydem_wall_shares
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
@@ -179,12 +179,12 @@ contains
       next = n
       tested = n + 1_ip
       associate (mine => shares%mine((low - 1_ip)/block_size + 1_ip))
-         if (allocated(history%memory)) then
+         if (allocated(history%features)) then
             do c = 1_ip, n
-               mine%memory(c) = history%memory(shares%pair(low + c - 1_ip))
+               mine%features(c) = history%features(shares%pair(low + c - 1_ip))
             end do
          else
-            mine%memory(:n) = 0_ip
+            mine%features(:n) = 0_ip
          end if
          do while (next >= 1_ip)
             call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, 1_ip, next, tested, mine, &
@@ -281,7 +281,7 @@ contains
       allocate (shares%root(room), shares%ratio(room), shares%direction(2, room))
       allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
       do k = 1_ip, size(shares%mine, kind=ip)
-         allocate (shares%mine(k)%memory(block_size))
+         allocate (shares%mine(k)%features(block_size))
       end do
    end subroutine reserve_pairs
 

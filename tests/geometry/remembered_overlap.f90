@@ -26,35 +26,35 @@ module remembered_overlap
 
 contains
 
-   !> Overlap of a pair from what is remembered; `memory` becomes what the next step remembers, as in `fill_block`
-   subroutine overlap_with_memory(pair, effective, memory, overlap)
+   !> Overlap of a pair from what is remembered; `features` becomes what the next step remembers, as in `fill_block`
+   subroutine overlap_with_memory(pair, effective, features, overlap)
       !> The pair, P first
       type(pair_t), intent(in) :: pair
       !> Whether to compute the effective area
       logical, intent(in) :: effective
       !> Any integer
-      integer(ip), intent(inout) :: memory
+      integer(ip), intent(inout) :: features
       !> The overlap
       type(overlap_t), intent(out) :: overlap
       integer(ip) :: rejected
       logical :: done
 
-      call separated_by(pair, memory, done)
+      call separated_by(pair, features, done)
       if (done) return
-      call certified_lens(pair, effective, memory, overlap, done)
+      call certified_lens(pair, effective, features, overlap, done)
       if (done) return
-      rejected = max(0_ip, memory)
-      call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), effective, overlap, memory, &
-                        rejected)
-      if (memory == 0_ip) memory = rejected
+      rejected = max(0_ip, features)
+      call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), effective, overlap, &
+                        features, rejected)
+      if (features == 0_ip) features = rejected
    end subroutine overlap_with_memory
 
    !> Test whether a remembered edge separates a pair
-   subroutine separated_by(pair, memory, apart)
+   subroutine separated_by(pair, features, apart)
       !> The pair, P first
       type(pair_t), intent(in) :: pair
       !> Any integer; the corner is brought up to date
-      integer(ip), intent(inout) :: memory
+      integer(ip), intent(inout) :: features
       !> Whether an edge is remembered, and the polygons are apart
       logical, intent(out) :: apart
       type(overlap_batch_t) :: batch
@@ -62,13 +62,14 @@ contains
       integer(ip) :: n, m
 
       apart = .false.
-      if (memory >= 0_ip) return
+      if (features >= 0_ip) return
       n = size(pair%p, 2, kind=ip)
       m = size(pair%q, 2, kind=ip)
-      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
+      call add_lane(batch, 1_ip, features, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), &
+                    radius_of(pair%q))
       call test_edges(batch, 1_ip, n + m, vertices_of(pair), isa_base, lane_apart)
       apart = lane_apart(1)
-      memory = batch%memory(1)
+      features = batch%features(1)
    end subroutine separated_by
 
    !> Vertices of both polygons of a pair
@@ -81,13 +82,13 @@ contains
    end function vertices_of
 
    !> Overlap of a pair if a remembered lens is certified
-   subroutine certified_lens(pair, effective, memory, overlap, certified)
+   subroutine certified_lens(pair, effective, features, overlap, certified)
       !> The pair, P first
       type(pair_t), intent(in) :: pair
       !> Whether to compute the effective area
       logical, intent(in) :: effective
       !> Any integer
-      integer(ip), intent(in) :: memory
+      integer(ip), intent(in) :: features
       !> The overlap; zero if it is not certified
       type(overlap_t), intent(out) :: overlap
       !> Whether it is certified
@@ -98,7 +99,8 @@ contains
 
       n = size(pair%p, 2, kind=ip)
       m = size(pair%q, 2, kind=ip)
-      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
+      call add_lane(batch, 1_ip, features, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), &
+                    radius_of(pair%q))
       call evaluate_batch(batch, 1_ip, vertices_of(pair), effective, columns)
       certified = batch%certified(1) > 0.0_wp
       if (.not. certified) return

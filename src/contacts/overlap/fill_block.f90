@@ -32,7 +32,7 @@ module polydem_fill_block
    !> Number of pairs whose remembered edges are tested at a time
    integer(ip), parameter :: ahead = 2_ip*block_size
 
-   !> Where the walk over the pairs is
+   !> Where the loop over the pairs is
    type :: place_t
       !> Last pair to examine, next one, and first one whose remembered edges have been tested
       integer(ip) :: low, next, tested
@@ -54,7 +54,7 @@ contains
       integer(ip), intent(inout) :: next
       !> From this pair on, remembered edges have been tested; greater than `next` at the start
       integer(ip), intent(inout) :: tested
-      !> Contact history of the pairs: `memory` is updated, and the other columns are cleared for pairs whose polygons
+      !> Contact history of the pairs: `features` is updated, and the other columns are cleared for pairs whose polygons
       !> do not overlap; any column may be absent
       type(contact_history_t), intent(inout) :: history
       !> Contacts; the columns that the force law fills are not changed
@@ -124,11 +124,11 @@ contains
          do while (next >= low .and. block%n < block_size)
             if (next < tested) then
                tested = max(low, next - ahead + 1_ip)
-               if (allocated(history%memory)) call forget_edges(bodies, radius, start, outline, tested, next, &
-                                                                first, second, history%memory)
+               if (allocated(history%features)) call forget_edges(bodies, radius, start, outline, tested, next, &
+                                                                first, second, history%features)
             end if
-            if (allocated(history%memory)) then
-               call select_in_range(tested, next, history%memory(tested:next), block, batch)
+            if (allocated(history%features)) then
+               call select_in_range(tested, next, history%features(tested:next), block, batch)
             else
                nothing = 0_ip
                call select_in_range(tested, next, nothing(:next - tested + 1_ip), block, batch)
@@ -138,7 +138,7 @@ contains
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
-   subroutine forget_edges(bodies, radius, start, outline, from, to, first, second, memory)
+   subroutine forget_edges(bodies, radius, start, outline, from, to, first, second, features)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in), contiguous :: radius(:)
       integer(ip), intent(in), contiguous :: start(:)
@@ -146,7 +146,7 @@ contains
       !> First and last pair, at most `ahead` pairs
       integer(ip), intent(in) :: from, to
       integer(ip), intent(in), contiguous :: first(:), second(:)
-      integer(ip), intent(inout), contiguous :: memory(:)
+      integer(ip), intent(inout), contiguous :: features(:)
       type(overlap_batch_t) :: batch
       integer(ip) :: found(ahead), i(block_size), j(block_size), k, n, n_found, p, done
       logical :: apart(block_size)
@@ -154,28 +154,28 @@ contains
       n_found = 0_ip
       do p = from, to
          found(n_found + 1_ip) = p
-         n_found = n_found + shiftr(memory(p), bit_size(p) - 1)
+         n_found = n_found + shiftr(features(p), bit_size(p) - 1)
       end do
       do done = 0_ip, n_found - 1_ip, block_size
          n = min(block_size, n_found - done)
          call describe_pairs(bodies, n, found(done + 1:done + n), first, second, radius, start, i, j, batch)
          do k = 1_ip, n
-            batch%memory(k) = memory(found(done + k))
+            batch%features(k) = features(found(done + k))
          end do
          call test_edges(batch, n, size(outline, 2, kind=ip), outline, bodies%isa, apart)
          do k = 1_ip, n
-            memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
+            features(found(done + k)) = merge(batch%features(k), 0_ip, apart(k))
          end do
       end do
    end subroutine forget_edges
 
    !> Add pairs without remembered edge to a block, in descending order, until it is full.
-   pure subroutine select_in_range(low, next, memory, block, batch)
+   pure subroutine select_in_range(low, next, features, block, batch)
       !> Last pair to examine
       integer(ip), intent(in) :: low
       !> First pair to examine; afterwards the next one
       integer(ip), intent(inout) :: next
-      integer(ip), intent(in) :: memory(low:next)
+      integer(ip), intent(in) :: features(low:next)
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t), intent(inout) :: batch
       integer(ip) :: c, p, last
@@ -187,8 +187,8 @@ contains
          last = max(low, p - (block_size - c) + 1_ip)
          do p = p, last, -1_ip
             block%pair(c + 1_ip) = p
-            batch%memory(c + 1_ip) = memory(p)
-            c = c + shiftr(not(memory(p)), bit_size(p) - 1)
+            batch%features(c + 1_ip) = features(p)
+            c = c + shiftr(not(features(p)), bit_size(p) - 1)
          end do
       end do
       next = p
@@ -232,7 +232,7 @@ contains
       !> Whether the polygons overlap
       logical, intent(out) :: exists
       type(overlap_t) :: overlap
-      integer(ip) :: memory, rejected, i, j
+      integer(ip) :: features, rejected, i, j
       integer :: k
 
       rejected = 0_ip
@@ -242,12 +242,12 @@ contains
          i = block%piece(c, 1)
          j = block%piece(c, 2)
       end if
-      if (allocated(history%memory)) rejected = max(0_ip, history%memory(block%pair(c)))
+      if (allocated(history%features)) rejected = max(0_ip, history%features(block%pair(c)))
       associate (p => block%pair(c))
          call find_overlap(outline(:, start(i):start(i + 1_ip) - 1_ip), outline(:, start(j):start(j + 1_ip) - 1_ip), &
-                           offset_of_contact(bodies, block, c), radius(i), radius(j), effective, overlap, memory, &
+                           offset_of_contact(bodies, block, c), radius(i), radius(j), effective, overlap, features, &
                            rejected)
-         if (allocated(history%memory)) history%memory(p) = merge(rejected, memory, memory == 0_ip)
+         if (allocated(history%features)) history%features(p) = merge(rejected, features, features == 0_ip)
          exists = overlap%area > 0.0_wp
          if (.not. exists) then
             if (.not. allocated(history%column)) return

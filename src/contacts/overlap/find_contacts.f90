@@ -25,7 +25,7 @@ contains
       integer(ip), intent(in) :: first(:)
       !> Higher slot of each pair, (n_pairs) or longer
       integer(ip), intent(in) :: second(:)
-      !> Contact history of the pairs: `memory` is updated, and the other columns are cleared for pairs whose polygons
+      !> Contact history of the pairs: `features` is updated, and the other columns are cleared for pairs whose polygons
       !> do not overlap; any column may be absent
       type(contact_history_t), intent(inout) :: history
       !> Contacts; `area_is_effective` must be set. The columns that the forces fill are not set

@@ -76,7 +76,7 @@ contains
       type(overlap_t) :: greatest
       type(overlap_t) :: overlap
       real(wp) :: offset(2)
-      integer(ip) :: a, b, memory, p, q, rejected, of_p(2), of_q(2)
+      integer(ip) :: a, b, features, p, q, rejected, of_p(2), of_q(2)
 
       p = smaller_of(bodies, i, j)
       q = i + j - p
@@ -89,11 +89,11 @@ contains
             rejected = 0_ip
             if (bodies%pieces%most == 1_ip) then
                call find_overlap(bodies%pieces%turned_polygon(p), bodies%pieces%turned_polygon(q), offset, &
-                                 bodies%radius(p), bodies%radius(q), .false., overlap, memory, rejected)
+                                 bodies%radius(p), bodies%radius(q), .false., overlap, features, rejected)
             else
                call find_overlap(outline_of(bodies, a), outline_of(bodies, b), &
                                  offset + (bodies%pieces%arm(:, b) - bodies%pieces%arm(:, a)), &
-                                 bodies%pieces%radius(a), bodies%pieces%radius(b), .false., overlap, memory, rejected)
+                                 bodies%pieces%radius(a), bodies%pieces%radius(b), .false., overlap, features, rejected)
                overlap%centroid = overlap%centroid + bodies%pieces%arm(:, a)
             end if
             if (overlap%area > greatest%area) greatest = overlap

@@ -16,7 +16,7 @@ module polydem_packed_history
       !> Identifiers of both bodies in one word, the lower one in the upper half, ascending, (pair)
       integer(lp), allocatable :: key(:)
       !> What the search for overlaps remembers, (pair)
-      integer(ip), allocatable :: memory(:)
+      integer(ip), allocatable :: features(:)
       !> Columns of the contact history, or one of zeros if there is none, (column, pair)
       real(wp), allocatable :: value(:, :)
    contains
@@ -36,7 +36,7 @@ contains
 
       n = size(self%value, 2) + size(chosen)
       self%key = [self%key, other%key(chosen)]
-      self%memory = [self%memory, other%memory(chosen)]
+      self%features = [self%features, other%features(chosen)]
       self%value = reshape([self%value, other%value(:, chosen)], [size(self%value, 1), n])
    end subroutine append
 
@@ -57,7 +57,7 @@ contains
       n_columns = 0
       if (allocated(history%column)) n_columns = size(history%column)
       packed%key = pair_key(id(first(:n)), id(second(:n)))
-      packed%memory = history%memory(:n)
+      packed%features = history%features(:n)
       allocate (packed%value(max(1, n_columns), n), source=0.0_wp)
       do j = 1, n_columns
          packed%value(j, :) = history%column(j)%value(:n)
@@ -105,11 +105,11 @@ contains
       order = pair(order)
       allocate (sent(2, m))
       sent(1, :) = packed%key(order)
-      sent(2, :) = int(packed%memory(order), lp)
+      sent(2, :) = int(packed%features(order), lp)
       call comm%all_to_all(sent, counts, received, counts_received)
       call comm%all_to_all(packed%value(:, order), counts, other%value, counts_received)
       other%key = received(1, :)
-      other%memory = int(received(2, :), ip)
+      other%features = int(received(2, :), ip)
       call other%append(packed, kept(:n_kept))
       call sort_pairs(other, packed)
    end subroutine send_pairs
@@ -150,7 +150,7 @@ contains
       order = ascending_order(unsorted%key)
       order = pack(order, [(is_new(k), k=1_ip, size(order, kind=ip))])
       packed%key = unsorted%key(order)
-      packed%memory = unsorted%memory(order)
+      packed%features = unsorted%features(order)
       packed%value = unsorted%value(:, order)
 
    contains
@@ -196,7 +196,7 @@ contains
          if (k > size(packed%key)) return
          if (packed%key(k) /= key) cycle
          n_known = n_known + 1_ip
-         history%memory(p) = packed%memory(k)
+         history%features(p) = packed%features(k)
          do j = 1, n_columns
             history%column(j)%value(p) = packed%value(j, k)
          end do

@@ -43,10 +43,10 @@ contains
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards, &
                  thickness => simulation%bodies%thickness)
-         if (any_deeper(s%walk%flagged, thickness, settings%overlap_limit)) then
-            worst = deepest_contact(s%walk%flagged, thickness)
-            text = depth_text(s%bodies, s%walk%flagged, thickness, worst)
-            share = real(depth_share(s%walk%flagged, thickness, worst), dp)
+         if (any_deeper(s%loop%flagged, thickness, settings%overlap_limit)) then
+            worst = deepest_contact(s%loop%flagged, thickness)
+            text = depth_text(s%bodies, s%loop%flagged, thickness, worst)
+            share = real(depth_share(s%loop%flagged, thickness, worst), dp)
          end if
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return

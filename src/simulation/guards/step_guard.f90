@@ -47,7 +47,7 @@ contains
       type(simulation_t), intent(in) :: simulation
 
       asks = .false.
-      if (.not. self%is_on .or. simulation%walk%flagged%n == 0_ip) return
+      if (.not. self%is_on .or. simulation%loop%flagged%n == 0_ip) return
       asks = greatest_share(simulation) > max(warn_share, 1.1_wp*self%warned)
    end function asks
 

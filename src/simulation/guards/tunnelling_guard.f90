@@ -1,4 +1,4 @@
-!> Guard of bodies that pass through each other. The walk over the contacts finds them (`polydem_contact_flags`).
+!> Guard of bodies that pass through each other. The loop over the contacts finds them (`polydem_contact_flags`).
 module polydem_tunnelling_guard
    use polydem_contact_flags, only: passing_text
    use polydem_errors, only: error_t
@@ -39,9 +39,9 @@ contains
       integer(ip) :: found
       integer(lp) :: place
 
-      if (simulation%walk%passing_pair == 0_ip .or. allocated(error)) return
-      associate (s => simulation, flagged => simulation%walk%flagged)
-         found = findloc(flagged%pair(:flagged%n), s%walk%passing_pair, dim=1)
+      if (simulation%loop%passing_pair == 0_ip .or. allocated(error)) return
+      associate (s => simulation, flagged => simulation%loop%flagged)
+         found = findloc(flagged%pair(:flagged%n), s%loop%passing_pair, dim=1)
          place = place_of(s%bodies, flagged%first(found), flagged%second(found))
          call self%warning%respond(self%choice, 'step '//to_text(s%step)//': '// &
                                    passing_text(s%bodies, flagged, s%bodies%radius, found, &

@@ -1,6 +1,6 @@
-!> Results of the walk over the contacts of a step. The arrays stay from step to step, so that a step allocates no
+!> Results of the loop over the contacts of a step. The arrays stay from step to step, so that a step allocates no
 !> memory.
-module polydem_walk_results
+module polydem_thread_results
    use polydem_contact_incidence, only: incidence_t
    use polydem_contact_rows, only: contact_rows_t
    use polydem_contacts, only: contacts_t
@@ -11,7 +11,7 @@ module polydem_walk_results
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: walk_results_t, range_results_t
+   public :: loop_results_t, range_results_t
 
    !> What one thread finds in its range of pairs, as sums and single values
    type :: range_results_t
@@ -23,11 +23,11 @@ module polydem_walk_results
       integer(ip) :: passing_pair = 0_ip
    end type range_results_t
 
-   !> Results of the walk of a step, and the limits of its flags
-   type :: walk_results_t
-      !> Step of the walk; -1 before the first
+   !> Results of the loop of a step, and the limits of its flags
+   type :: loop_results_t
+      !> Step of the loop; -1 before the first
       integer(lp) :: step = -1_lp
-      !> Whether the walk keeps the table of all contacts
+      !> Whether the loop keeps the table of all contacts
       logical :: has_table = .false.
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
@@ -35,7 +35,7 @@ module polydem_walk_results
       type(contact_rows_t), allocatable :: all_of(:), flagged_of(:)
       !> Their contacts with fixed bodies
       type(wall_terms_t), allocatable :: walls_of(:)
-      !> Time of the walk over each range [s]
+      !> Time of the loop over each range [s]
       real(dp), allocatable :: elapsed(:)
       !> Part of all pairs up to the end of each range, (0:number of ranges)
       real(dp), allocatable :: upto(:)
@@ -51,6 +51,6 @@ module polydem_walk_results
       integer(ip) :: passing_pair = 0_ip
       !> Contacts of each body, if the table of contacts is kept
       type(incidence_t) :: incidence
-   end type walk_results_t
+   end type loop_results_t
 
-end module polydem_walk_results
+end module polydem_thread_results

@@ -1,5 +1,5 @@
 !> Lines of the program on standard output, and its messages on standard error.
-module polydem_screen
+module polydem_console
    use polydem_errors, only: error_t
    use polydem_line_writer, only: line_writer_t
    use polydem_strings, only: printable
@@ -34,4 +34,4 @@ contains
       call screen%close(ignored)
    end subroutine warn
 
-end module polydem_screen
+end module polydem_console

@@ -1,9 +1,9 @@
-!> From pairs to forces on bodies in one walk over blocks of contacts: overlaps, force law, guards, sums per body.
+!> From pairs to forces on bodies in one loop over blocks of contacts: overlaps, force law, guards, sums per body.
 !>
 !> A block of contacts stays in the first-level cache from its overlaps to the sums of its forces; a table of contacts
-!> is written only for those who ask for it. Each thread walks over one range of pairs. Sums of forces are in the same
+!> is written only for those who ask for it. Each thread runs over one range of pairs. Sums of forces are in the same
 !> order for any number of threads (see `polydem_force_sums`).
-module polydem_contact_walk
+module polydem_contact_loop
    use omp_lib, only: omp_get_max_threads
    use polydem_clock, only: wall_seconds
    use polydem_contact_block, only: block_size, contact_block_t
@@ -20,18 +20,18 @@ module polydem_contact_walk
    use polydem_contact_flags, only: test_block
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
    use polydem_timers, only: block_clock_t
-   use polydem_walk_results, only: range_results_t, walk_results_t
+   use polydem_thread_results, only: range_results_t, loop_results_t
    use polydem_wall_shares, only: find_shares, set_shares
    use polydem_wall_terms, only: append_border, append_walls, join_walls
    implicit none
    private
-   public :: walk_contacts
+   public :: loop_over_contacts
 
 contains
 
    !> Sum the contact forces on all bodies over the pairs of this step.
-   subroutine walk_contacts(self, dt, tabulate, clock, error)
-      !> The simulation with its pair list; sums of forces, contact history and the results of the walk are set
+   subroutine loop_over_contacts(self, dt, tabulate, clock, error)
+      !> The simulation with its pair list; sums of forces, contact history and the results of the loop are set
       type(simulation_t), intent(inout) :: self
       !> Time since the last evaluation [s]
       real(wp), intent(in) :: dt
@@ -45,11 +45,11 @@ contains
       integer(ip) :: n, r, k
 
       if (allocated(error)) return
-      self%walk%has_table = tabulate
+      self%loop%has_table = tabulate
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
-         call divide_pairs(pairs%n, pairs%first, self%bodies%pieces, n, self%walk%upto, ends)
-         call reserve_ranges(n, self%walk)
+         call divide_pairs(pairs%n, pairs%first, self%bodies%pieces, n, self%loop%upto, ends)
+         call reserve_ranges(n, self%loop)
          last(0) = 0_ip
          do r = 1_ip, n - 1_ip
             last(r) = self%bodies%pieces%body_of(pairs%first(ends(r)))
@@ -58,43 +58,43 @@ contains
       end associate
       call begin_sums(self%bodies%n, self%force_sums)
       if (self%law%needs_shares) &
-         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%walk%shares)
+         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%loop%shares)
       !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n, clock) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
-         call walk_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r), clock)
+         call loop_over_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r), clock)
       end do
       !$omp end do
       !$omp do schedule(static, 1)
       do k = 1_ip, n
          do r = n - 1_ip, 1_ip, -1_ip
-            call add_late_terms(self%walk%ranges(r)%late, k, n, self%force_sums)
+            call add_late_terms(self%loop%ranges(r)%late, k, n, self%force_sums)
          end do
-         if (k == n) call join_walls(self%walk%walls_of(:n), self%walk%walls)
+         if (k == n) call join_walls(self%loop%walls_of(:n), self%loop%walls)
       end do
       !$omp end do nowait
       !$omp end parallel
-      self%walk%step = self%step
-      call balance_ranges(self%walk%elapsed(:n), self%walk%upto)
+      self%loop%step = self%step
+      call balance_ranges(self%loop%elapsed(:n), self%loop%upto)
       call gather_results(self, n)
-      if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%walk%incidence)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%walk%flagged, self%step, error)
-   end subroutine walk_contacts
+      if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%loop%incidence)
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%loop%flagged, self%step, error)
+   end subroutine loop_over_contacts
 
    !> Make room for the results of n ranges.
-   subroutine reserve_ranges(n, walk)
+   subroutine reserve_ranges(n, loop)
       integer(ip), intent(in) :: n
-      type(walk_results_t), intent(inout) :: walk
+      type(loop_results_t), intent(inout) :: loop
 
-      if (allocated(walk%ranges)) then
-         if (size(walk%ranges) >= n) return
-         deallocate (walk%ranges, walk%all_of, walk%walls_of, walk%flagged_of, walk%elapsed)
+      if (allocated(loop%ranges)) then
+         if (size(loop%ranges) >= n) return
+         deallocate (loop%ranges, loop%all_of, loop%walls_of, loop%flagged_of, loop%elapsed)
       end if
-      allocate (walk%ranges(n), walk%all_of(n), walk%walls_of(n), walk%flagged_of(n), walk%elapsed(n))
+      allocate (loop%ranges(n), loop%all_of(n), loop%walls_of(n), loop%flagged_of(n), loop%elapsed(n))
    end subroutine reserve_ranges
 
    !> Walk over the pairs of one range in descending order.
-   subroutine walk_range(self, dt, r, ends, last, clock)
+   subroutine loop_over_range(self, dt, r, ends, last, clock)
       type(simulation_t), intent(inout) :: self
       real(wp), intent(in) :: dt
       !> Index of the range
@@ -112,13 +112,13 @@ contains
       integer(ip) :: next, tested, low, high, cursor
 
       began = wall_seconds()
-      call start_results(self%contacts, r, self%walk)
+      call start_results(self%contacts, r, self%loop)
       next = ends(2)
       tested = next + 1_ip
       high = last(2)
       cursor = 0_ip
-      if (self%law%needs_shares .and. self%walk%shares%n > 0_ip) &
-         cursor = count(self%walk%shares%pair(:self%walk%shares%n) <= ends(2), kind=ip)
+      if (self%law%needs_shares .and. self%loop%shares%n > 0_ip) &
+         cursor = count(self%loop%shares%pair(:self%loop%shares%n) <= ends(2), kind=ip)
       do while (next > ends(1))
          call own_clock%begin_block()
          associate (pairs => self%neighbours%pairs)
@@ -126,7 +126,7 @@ contains
                             ends(1) + 1_ip, next, tested, self%history, block)
          end associate
          call own_clock%end_part(1)
-         if (self%law%needs_shares) call set_shares(self%walk%shares, cursor, block)
+         if (self%law%needs_shares) call set_shares(self%loop%shares, cursor, block)
          call self%law%apply(self%bodies, dt, block, self%history)
          call terms_of_block(block, terms)
          ! Sums begin just before their first terms: no contact so far had a lower slot.
@@ -135,27 +135,27 @@ contains
             call clear_sums(low, high, self%force_sums)
             high = min(high, low - 1_ip)
          end if
-         call add_terms(block, terms, last(2), self%force_sums, self%walk%ranges(r)%late)
+         call add_terms(block, terms, last(2), self%force_sums, self%loop%ranges(r)%late)
          call keep_contacts(self, r, block, terms)
          call own_clock%end_part(2)
       end do
       call clear_sums(last(1) + 1_ip, high, self%force_sums)
       if (r == 1_ip) clock = own_clock
-      self%walk%elapsed(r) = max(wall_seconds() - began, tiny(began))
-   end subroutine walk_range
+      self%loop%elapsed(r) = max(wall_seconds() - began, tiny(began))
+   end subroutine loop_over_range
 
    !> Empty the results of a range. About as many contacts are expected as this rank owned in the last step.
-   subroutine start_results(contacts, r, walk)
+   subroutine start_results(contacts, r, loop)
       type(contacts_t), intent(in) :: contacts
       !> Index of the range
       integer(ip), intent(in) :: r
-      type(walk_results_t), intent(inout) :: walk
+      type(loop_results_t), intent(inout) :: loop
 
-      call start_rows(contacts, merge(walk%ranges(r)%n_contacts, 0_ip, walk%has_table), walk%all_of(r))
-      call start_rows(contacts, 0_ip, walk%flagged_of(r))
-      walk%walls_of(r)%n = 0_ip
-      walk%walls_of(r)%border%n = 0_ip
-      associate (results => walk%ranges(r))
+      call start_rows(contacts, merge(loop%ranges(r)%n_contacts, 0_ip, loop%has_table), loop%all_of(r))
+      call start_rows(contacts, 0_ip, loop%flagged_of(r))
+      loop%walls_of(r)%n = 0_ip
+      loop%walls_of(r)%border%n = 0_ip
+      associate (results => loop%ranges(r))
          results%late%n = 0_ip
          results%n_contacts = 0_ip
          results%n_degenerate = 0_ip
@@ -163,7 +163,7 @@ contains
       end associate
    end subroutine start_results
 
-   !> Count the contacts of a block, test them by the guards, and keep those that are needed after the walk.
+   !> Count the contacts of a block, test them by the guards, and keep those that are needed after the loop.
    subroutine keep_contacts(self, r, block, terms)
       type(simulation_t), intent(inout) :: self
       !> Index of the range
@@ -172,14 +172,14 @@ contains
       type(contact_terms_t), intent(in) :: terms
       logical :: suspect(block_size), some
 
-      associate (walk => self%walk)
-         call count_block(self, block, walk%ranges(r))
-         if (walk%has_table) call append_rows(block, walk%all_of(r), with_forces=.true.)
-         call append_walls(self%bodies%fixed, block, terms, walk%walls_of(r))
-         if (self%bodies%cell%is_sheared) call append_border(self%bodies, block, terms, walk%walls_of(r)%border)
-         call test_block(walk%flag_limits, self%bodies, block, self%history, suspect, some, &
-                         walk%ranges(r)%passing_pair)
-         if (some) call append_rows(block, walk%flagged_of(r), with_forces=.true., chosen=suspect)
+      associate (loop => self%loop)
+         call count_block(self, block, loop%ranges(r))
+         if (loop%has_table) call append_rows(block, loop%all_of(r), with_forces=.true.)
+         call append_walls(self%bodies%fixed, block, terms, loop%walls_of(r))
+         if (self%bodies%cell%is_sheared) call append_border(self%bodies, block, terms, loop%walls_of(r)%border)
+         call test_block(loop%flag_limits, self%bodies, block, self%history, suspect, some, &
+                         loop%ranges(r)%passing_pair)
+         if (some) call append_rows(block, loop%flagged_of(r), with_forces=.true., chosen=suspect)
       end associate
    end subroutine keep_contacts
 
@@ -210,19 +210,19 @@ contains
       self%contacts%n = 0_ip
       n_degenerate = 0_ip
       self%n_contacts = 0_ip
-      self%walk%passing_pair = 0_ip
-      associate (walk => self%walk)
+      self%loop%passing_pair = 0_ip
+      associate (loop => self%loop)
          do r = n, 1_ip, -1_ip
-            self%n_contacts = self%n_contacts + walk%ranges(r)%n_contacts
-            n_degenerate = n_degenerate + walk%ranges(r)%n_degenerate
-            if (walk%ranges(r)%passing_pair > 0_ip) walk%passing_pair = walk%ranges(r)%passing_pair
+            self%n_contacts = self%n_contacts + loop%ranges(r)%n_contacts
+            n_degenerate = n_degenerate + loop%ranges(r)%n_degenerate
+            if (loop%ranges(r)%passing_pair > 0_ip) loop%passing_pair = loop%ranges(r)%passing_pair
          end do
-         if (walk%has_table) call gather_rows(walk%all_of(:n), self%contacts)
+         if (loop%has_table) call gather_rows(loop%all_of(:n), self%contacts)
          ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
-         if (walk%has_table .and. .not. allocated(self%law%constraint)) call release_rows(walk%all_of)
-         call gather_rows(walk%flagged_of(:n), walk%flagged)
+         if (loop%has_table .and. .not. allocated(self%law%constraint)) call release_rows(loop%all_of)
+         call gather_rows(loop%flagged_of(:n), loop%flagged)
       end associate
-      associate (flagged => self%walk%flagged)
+      associate (flagged => self%loop%flagged)
          flagged%n_degenerate = 0_ip
          do c = 1_ip, flagged%n
             if (is_degenerate(flagged, c)) flagged%n_degenerate = flagged%n_degenerate + 1_ip
@@ -233,4 +233,4 @@ contains
       self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(n_degenerate, lp)
    end subroutine gather_results
 
-end module polydem_contact_walk
+end module polydem_contact_loop

@@ -1,7 +1,7 @@
 !> The first pass of a step over the bodies: prediction before the forces are computed.
 !>
 !> The pass does all that it can do for a block of bodies while the block is in the cache.
-module polydem_prediction
+module polydem_predict
    use polydem_bodies, only: block_size
    use polydem_body_runs, only: find_run, list_others, number_of_parts
    use polydem_bodies_in_cell, only: put_into_cell, wrap_bodies
@@ -202,8 +202,8 @@ contains
       !> Time step; 0 at the start [s]
       real(wp), intent(in) :: dt
 
-      call correct_loads(self%loads, self%comm, dt, time_of(self), self%named, self%bodies, self%walk%walls)
+      call correct_loads(self%loads, self%comm, dt, time_of(self), self%named, self%bodies, self%loop%walls)
       call move_walls(self, time_of(self))
    end subroutine yield_walls
 
-end module polydem_prediction
+end module polydem_predict

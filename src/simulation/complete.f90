@@ -1,7 +1,7 @@
 !> The second pass of a step over the bodies: completion after the forces are computed.
 !>
 !> The pass does all that it can do for a block of bodies while the block is in the cache.
-module polydem_completion
+module polydem_complete
    use polydem_bodies, only: block_size, bodies_t
    use polydem_body_runs, only: find_run, number_of_parts
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step
@@ -42,7 +42,7 @@ contains
       if (n > 0_ip) done = self%bodies%free(n)
       call keep_fixed(done + 1_ip, self%bodies%n, self%force_sums, self%bodies)
       if (self%settings%output%energy_balance) call count_step(self%energy_balance)
-      if (allocated(self%record%sums)) call self%record%accumulate(self%named, self%bodies, self%walk%walls, 1.0_wp)
+      if (allocated(self%record%sums)) call self%record%accumulate(self%named, self%bodies, self%loop%walls, 1.0_wp)
       associate (moving => self%motion_check%moving)
          do k = n + 1_ip, size(moving, kind=ip)
             good = good .and. move_within_limit(self%motion_check, self%bodies, moving(k), moving(k), self%dt)
@@ -84,7 +84,7 @@ contains
          end do
       end do
       if (low > high .or. .not. self%settings%output%energy_balance) return
-      call accumulate_walls(self%energy_balance, self%bodies, self%walk%walls, self%bodies%free(low), &
+      call accumulate_walls(self%energy_balance, self%bodies, self%loop%walls, self%bodies%free(low), &
                             self%bodies%free(high))
    end subroutine complete_part
 
@@ -122,4 +122,4 @@ contains
       good = good .and. move_within_limit(self%motion_check, self%bodies, first, last, self%dt)
    end subroutine complete_run
 
-end module polydem_completion
+end module polydem_complete
