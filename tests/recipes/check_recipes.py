@@ -2,8 +2,8 @@
 
 usage: check_recipes.py ROOT BUILD NINJA
 
-In a copy of src, Fortran blocks of the guide become new files, and diff blocks change files. The last file name before
-a block is its target. The changed files are compiled with the flags of BUILD against its modules, linked before its
+In a copy of src, each file of the folder examples goes to the place of the same name that the guide says, and diff blocks
+change the last file named before them. The changed files are compiled with the flags of BUILD against its modules, linked before its
 libraries, and run by try_recipes.f90. All output goes to a temporary folder.
 """
 
@@ -17,6 +17,8 @@ import sys
 import tempfile
 import time
 
+#: The files that the guide adds
+EXAMPLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "examples")
 #: Files that each recipe changes: the list of CMake, the table of namelist entries, and the factory
 CHANGED = {
     "src/contacts/forces/walton_braun.f90": {"src/contacts/forces/force_law.f90", "src/contacts/forces/CMakeLists.txt",
@@ -33,20 +35,20 @@ class RecipeError(Exception):
 
 
 def blocks_of(text):
-    """The Fortran and diff blocks of a page, as (language, last file name before the block, lines)."""
-    path, language, lines = None, None, []
+    """The examples and diff blocks of a page, as (path, lines of the diff); no lines for an example."""
+    path, lines = None, None
     for line in text.split("\n"):
-        fence = re.match(r"```(\w*)$", line)
-        if fence and language is None:
-            language, lines = fence.group(1), []
-        elif fence:
-            if language in ("fortran", "diff"):
-                yield language, path, lines
-            language = None
-        elif language is not None:
+        if lines is not None and line.startswith("```"):
+            yield path, lines
+            lines = None
+        elif lines is not None:
             lines.append(line)
+        elif line == "```diff":
+            lines = []
         else:
-            path = (re.findall(r"`(src/[\w/.]+)`", line) or [path])[-1]
+            for path in re.findall(r"`(src/[\w/.]+)`", line):
+                if os.path.exists(os.path.join(EXAMPLES, os.path.basename(path))):
+                    yield path, None
 
 
 def changed(text, lines):
@@ -63,18 +65,18 @@ def apply_recipes(root, copy):
     found, new = {}, None
     with open(os.path.join(root, "src", "recipes.md"), encoding="utf-8") as page:
         text = page.read()
-    for language, path, lines in blocks_of(text):
+    for path, lines in blocks_of(text):
         target = os.path.join(copy, path)
-        if language == "fortran":
+        if lines is None:
             if os.path.exists(target):
                 raise RecipeError(f"{path} exists already")
+            shutil.copy(os.path.join(EXAMPLES, os.path.basename(path)), target)
             new = path
             found[new] = set()
-            content = "\n".join(lines) + "\n"
-        else:
-            with open(target, encoding="utf-8") as source:
-                content = changed(source.read(), lines)
-            found[new].add(path)
+            continue
+        with open(target, encoding="utf-8") as source:
+            content = changed(source.read(), lines)
+        found[new].add(path)
         with open(target, "w", encoding="utf-8") as source:
             source.write(content)
     if found != CHANGED:
