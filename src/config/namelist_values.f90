@@ -56,7 +56,7 @@ contains
       if (entry%count > 0 .and. n /= entry%count) then
          call raise(error, input_error, value%place//': '//label(entry)//' takes '// &
             counted(int(entry%count, lp), 'value')//', but '//counted(int(n, lp), 'value')// &
-            trim(merge(' is ', ' are', n == 1))//' given')
+            trim(merge(' is ', ' are', n == 1))//' given'//advice(entry, statement))
          return
       end if
       value%reals = [(0.0_wp, k=1, merge(n, 0, entry%type == 'real'))]
@@ -72,6 +72,22 @@ contains
          end if
       end do
    end subroutine read_value
+
+   !> Advice for a number with a unit or with a decimal comma, which reads as two values; otherwise empty
+   pure function advice(entry, statement) result(text)
+      type(entry_t), intent(in) :: entry
+      type(statement_t), intent(in) :: statement
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (entry%count /= 1 .or. size(statement%values) /= 2 .or. entry%type /= 'real') return
+      if (is_number(lower_case(statement%values(2)%text))) then
+         text = '; a number has a decimal point, no comma'
+      else
+         text = '; write the number alone'
+         if (entry%unit /= '' .and. entry%unit /= '1') text = text//', in '//trim(entry%unit)
+      end if
+   end function advice
 
    !> Name of an entry in messages
    pure function label(entry) result(text)

@@ -243,8 +243,12 @@ contains
          to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
          ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
          ' 1/s; no point of it may move more than '//to_text(check%limit)// &
-         ' m in a step, otherwise bodies could pass through each other. Check for deep overlaps at the start, or '// &
-         check%remedy
+         ' m in a step, otherwise bodies could pass through each other. '
+      if (bodies%fixed(s)) then
+         text = text//'It is part of a wall: check the motion of the wall, or sign and unit of the load on it'
+      else
+         text = text//'Check for deep overlaps at the start, or '//check%remedy
+      end if
    end function motion_text
 
    !> Whether the state of a body is finite and no point of it moves too far in a step; false for NaN

@@ -178,8 +178,13 @@ contains
          associate (stage => simulation%settings%stage(stages%number))
             if (stage%until == 'duration') return
             text = trim(stage%until)//' is '
-            if (stages%value < 0.0_wp) text = text//'not known yet'
-            if (stages%value >= 0.0_wp) text = text//to_text(stages%value, 4)
+            if (stages%value >= huge(1.0_wp)) then
+               text = text//'not defined without contacts'
+            else if (stages%value >= 0.0_wp) then
+               text = text//to_text(stages%value, 4)
+            else
+               text = text//'not known yet'
+            end if
             if (stages%value < 0.0_wp .or. .not. holds(stage, stages%value)) text = text//', not'
             if (stage%above > 0.0_wp) text = text//' above '//to_text(stage%above, 4)
             if (.not. stage%above > 0.0_wp) text = text//' below '//to_text(stage%below, 4)

@@ -2,9 +2,9 @@
 
 usage: check_recipes.py ROOT BUILD NINJA
 
-In a copy of src, each file of the folder examples goes to the place of the same name that the guide says, and diff blocks
-change the last file named before them. The changed files are compiled with the flags of BUILD against its modules, linked before its
-libraries, and run by try_recipes.f90. All output goes to a temporary folder.
+In a copy of src, each file of the folder examples goes to the place of the same name that the guide says, and diff
+blocks change the last file named before them. The changed files are compiled with the flags of BUILD against its
+modules, linked before its libraries, and run by try_recipes.f90. All output goes to a temporary folder.
 """
 
 import json

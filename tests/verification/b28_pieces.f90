@@ -89,7 +89,8 @@ contains
       if (n == 2 .and. columns) &
          call table%expect_relative(trim(law)//', whole: stiffness [N/m2]', press_force(law, 1, columns)/depth, &
                                     whole(2)/depth, 1.0e-9_wp)
-      call table%expect_relative(name//': stiffness [N/m2]', press_force(law, n, columns)/depth, got(2)/depth, 1.0e-9_wp)
+      call table%expect_relative(name//': stiffness [N/m2]', press_force(law, n, columns)/depth, got(2)/depth, &
+                                 1.0e-9_wp)
       call load_on(table, law, 1, columns, tilt, tilted_whole)
       call load_on(table, law, n, columns, tilt, tilted)
       call table%expect_relative(name//': stiffness against tilts, over the whole', &

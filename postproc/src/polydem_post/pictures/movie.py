@@ -60,7 +60,7 @@ class Painter:
         frame = trajectory[first]
         prepare(self._axis, film.look, self._title(frame.time))
         self._bodies = drawing.draw_bodies(self._axis, frame, film.look)
-        add_scale(self._figure, [self._axis], self._bodies[1:], film.look, film.extend)
+        add_scale(self._figure, [self._axis], self._bodies[1:], film.look, film.extend, frame.material_names)
         finish_axes(self._figure, [self._axis], frame, film.look)
         drawing.fit_outlines(self._bodies[1], frame, drawing.points_per_metre(self._axis))
         for artist in (*(artist for each in self._bodies for artist in each.artists), self._axis.title):

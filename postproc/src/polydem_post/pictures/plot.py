@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -64,8 +65,12 @@ def prepare(axis, look: SettledLook, title: str) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | None = None) -> Colorbar | None:
-    """The scale of colours beside the axes, with arrows where bodies lie outside it, unless they are given."""
+def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | None = None,
+              materials: Sequence[str] = ()) -> Colorbar | None:
+    """The scale of colours beside the axes, with arrows where bodies lie outside it, unless they are given.
+
+    Colours of materials have their names.
+    """
     if not look.quantity:
         return None
     low, high = look.colour_range
@@ -78,7 +83,10 @@ def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | Non
     bar = figure.colorbar(grains[0].artist, ax=list(axes), label=look.quantity.title, pad=0.02, fraction=0.05,
                           aspect=30.0 * float(np.clip(rows * (y1 - y0) / (columns * (x1 - x0)), 1.0, 1.6)),
                           extend=extend or arrows[below, above])
-    if look.quantity.count:
+    if look.quantity.label == "material" and materials:
+        bar.set_ticks(range(1, len(materials) + 1), labels=materials)
+        bar.ax.set_ylim(0.5, len(materials) + 0.5)
+    elif look.quantity.count:
         bar.set_ticks(range(0, look.quantity.count, max(look.quantity.count // 10, 1)))
     elif look.quantity.span == "turn" and look.colour_range == (0.0, 2.0 * np.pi):
         bar.set_ticks([0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi, 2.0 * np.pi], labels=["0", "π/2", "π", "3π/2", "2π"])
@@ -88,7 +96,7 @@ def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | Non
 def _finish(figure: Figure, axes, frames: list[Frame], look: SettledLook) -> None:
     """Draw bodies, scale and legend; then, as the axes have their size, what is as wide as bodies."""
     grains = [drawing.draw_bodies(axis, frame, look)[1] for axis, frame in zip(axes, frames)]
-    add_scale(figure, axes, grains, look)
+    add_scale(figure, axes, grains, look, materials=frames[0].material_names)
     finish_axes(figure, axes, frames[0], look)
     for axis, frame, each in zip(axes, frames, grains):
         drawing.fit_outlines(each, frame, drawing.points_per_metre(axis))
