@@ -4,7 +4,8 @@ module polydem_reference
    use polydem_errors, only: error_t, raise, run_error
    use polydem_hash, only: add_modulo
    use polydem_kinds, only: ip, lp
-   use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_neighbours, only: neighbours_t
+   use polydem_new_neighbours, only: new_neighbours
    use polydem_pair_list, only: pair_list_t
    use polydem_pair_list_hash, only: list_hash
    use polydem_strings, only: to_text

@@ -2,7 +2,7 @@
 module polydem_check_ranks
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_force_law, only: check_law
+   use polydem_law_factory, only: check_law
    use polydem_kinds, only: ip
    use polydem_source_locations, only: place_of
    use polydem_settings, only: settings_t

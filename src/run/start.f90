@@ -5,7 +5,7 @@ module polydem_start
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_end_condition, only: pass_end
    use polydem_errors, only: error_t
-   use polydem_force_law, only: check_law
+   use polydem_law_factory, only: check_law
    use polydem_former_step, only: find_former_step
    use polydem_global_hash, only: hash_scene
    use polydem_hash, only: hexadecimal

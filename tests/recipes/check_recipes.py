@@ -21,8 +21,8 @@ import time
 EXAMPLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "examples")
 #: Files that each recipe changes: the list of CMake, the table of namelist entries, and the factory
 CHANGED = {
-    "src/contacts/forces/walton_braun.f90": {"src/contacts/forces/force_law.f90", "src/contacts/forces/CMakeLists.txt",
-                                             "src/config/entries.txt"},
+    "src/contacts/forces/damping/walton_braun.f90": {"src/contacts/forces/law_factory.f90",
+                                                     "src/contacts/forces/CMakeLists.txt", "src/config/entries.txt"},
     "src/neighbours/finders/plain_loop.f90": {"src/neighbours/finders/finder_factory.f90",
                                               "src/neighbours/finders/CMakeLists.txt", "src/config/entries.txt"},
     "src/contacts/fields/magnus_force.f90": {"src/contacts/fields/body_forces.f90",
@@ -113,9 +113,10 @@ def build_program(root, copy, build, ninja, folder):
                    check=True)
     plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
     forces, finders, fields, guards = (os.path.join(root, "src", name) for name in (
-        "contacts/forces/force_law.f90", "neighbours/finders/finder_factory.f90", "contacts/fields/body_forces.f90",
+        "contacts/forces/law_factory.f90", "neighbours/finders/finder_factory.f90", "contacts/fields/body_forces.f90",
         "simulation/guards/guard_list.f90"))
-    for name, like in (("contacts/forces/walton_braun.f90", forces), ("contacts/forces/force_law.f90", forces),
+    for name, like in (("contacts/forces/damping/walton_braun.f90", forces),
+                       ("contacts/forces/law_factory.f90", forces),
                        ("neighbours/finders/plain_loop.f90", finders),
                        ("neighbours/finders/finder_factory.f90", finders),
                        ("contacts/fields/magnus_force.f90", fields), ("contacts/fields/body_forces.f90", fields),

@@ -7,7 +7,8 @@ module posed_pair
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_find_contacts, only: find_contacts
-   use polydem_force_law, only: force_law_t, new_force_law
+   use polydem_force_law, only: force_law_t
+   use polydem_law_factory, only: new_force_law
    use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t

@@ -1,7 +1,8 @@
 !> Depth to which a block at rest sinks into its support.
 module polydem_static_depth
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_force_law, only: choose_parts, force_law_t
+   use polydem_force_law, only: force_law_t
+   use polydem_law_factory, only: choose_parts
    use polydem_force_part, only: resting_block_t
    use polydem_kinds, only: wp
    use polydem_pair_parameters, only: pair_parameters

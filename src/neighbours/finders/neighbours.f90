@@ -1,18 +1,16 @@
 !> Neighbour stage of the time step. Its input are the boxes; its output is the ascending list of pairs of pieces whose
-!> boxes overlap.
+!> boxes overlap. It knows no finder by name; `polydem_new_neighbours` makes one.
 module polydem_neighbours
    use polydem_boxes, only: boxes_t
    use polydem_counters, only: counters_t, over_steps
-   use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
-   use polydem_finder_factory, only: new_finder
-   use polydem_finder_statistics, only: phase_merge, phase_order
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_finder_statistics, only: finder_statistics_t, phase_merge, phase_order
+   use polydem_kinds, only: ip, lp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_pair_list, only: pair_list_t
    implicit none
    private
-   public :: neighbours_t, new_neighbours, start_neighbours
+   public :: neighbours_t, start_neighbours, restart_neighbours
 
    !> Finder, list of changes, and list of pairs
    type :: neighbours_t
@@ -27,6 +25,7 @@ module polydem_neighbours
       !> Number of boxes and pieces of the last step
       integer(ip), private :: n_boxes = 0_ip, n_pieces = 0_ip
    contains
+      procedure :: set_finder
       procedure :: update
       procedure :: find
       procedure :: order
@@ -36,28 +35,6 @@ module polydem_neighbours
    end type neighbours_t
 
 contains
-
-   !> Make the stage with an empty list and a finder given by its name.
-   subroutine new_neighbours(self, finder_name, boxes, error, skin, isa)
-      !> Stage to make
-      type(neighbours_t), intent(out) :: self
-      !> Name of the finder
-      character(len=*), intent(in) :: finder_name
-      !> Boxes of the first step; only their number, pieces and bodies are used
-      type(boxes_t), intent(in) :: boxes
-      !> Allocated if there is no such finder
-      type(error_t), allocatable, intent(inout) :: error
-      !> Skin of a Verlet list [m]; 0 or absent: automatic
-      real(wp), intent(in), optional :: skin
-      !> Instruction set of the kernels; `isa_base` if absent
-      integer, intent(in), optional :: isa
-      class(finder_t), allocatable :: finder
-
-      call new_finder(finder, finder_name, error, skin)
-      if (allocated(error)) return
-      if (present(isa)) finder%isa = isa
-      call start_neighbours(self, finder, boxes)
-   end subroutine new_neighbours
 
    !> Make the stage with an empty list and a given finder.
    subroutine start_neighbours(self, finder, boxes)
@@ -74,6 +51,32 @@ contains
       self%n_pieces = boxes%n_pieces
       call self%pairs%start(boxes%one_to_one, boxes%n_pieces)
    end subroutine start_neighbours
+
+   !> Set the finder with which the next `restart_neighbours` starts.
+   subroutine set_finder(self, finder)
+      class(neighbours_t), intent(inout) :: self
+      !> Finder in its initial state
+      class(finder_t), intent(in) :: finder
+
+      if (allocated(self%unused)) deallocate (self%unused)
+      allocate (self%unused, source=finder)
+   end subroutine set_finder
+
+   !> Start again with an empty list and the chosen finder in its initial state. Its statistics are preserved.
+   subroutine restart_neighbours(self, boxes)
+      !> Stage with a finder
+      type(neighbours_t), intent(inout) :: self
+      !> Boxes of the next step; only their number, pieces and bodies are used
+      type(boxes_t), intent(in) :: boxes
+      class(finder_t), allocatable :: unused
+      type(finder_statistics_t) :: statistics
+
+      if (allocated(self%finder)) statistics = self%finder%work
+      call move_alloc(self%unused, unused)
+      call start_neighbours(self, unused, boxes)
+      self%finder%work%value = statistics%value
+      self%finder%work%seconds = statistics%seconds
+   end subroutine restart_neighbours
 
    !> Update the list of pairs to the boxes of a step.
    subroutine update(self, boxes)

@@ -5,7 +5,8 @@ module crowd
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_namelist_entries, only: choices_of
-   use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_neighbours, only: neighbours_t
+   use polydem_new_neighbours, only: new_neighbours
    use polydem_random, only: random_t, new_random
    implicit none
    private

@@ -3,10 +3,8 @@ module polydem_choose_step
    use polydem_begin_stage, only: find_last_steps
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_force_law, only: choose_parts, force_law_t
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
-   use polydem_pair_parameters, only: pair_parameters
    use polydem_run_duration, only: longest_run
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
@@ -29,21 +27,20 @@ contains
    !> step, reduced to divide the duration evenly, or to three digits if the run has stages.
    !> Collective; all ranks get the same error.
    subroutine choose_step(self, sample, error)
-      !> The simulation with settings, ranks, bodies and integrator; `dt`, `n_steps` and `expected_stable_step` are set
+      !> The simulation with settings, ranks, bodies, force law and integrator; `dt`, `n_steps` and
+      !> `expected_stable_step` are set
       type(simulation_t), intent(inout) :: self
       !> Bodies that will enter, the same on all ranks
       type(bodies_t), intent(in) :: sample
       !> Allocated if no step can be chosen, or if the number of steps is not allowed
       type(error_t), allocatable, intent(inout) :: error
-      type(force_law_t) :: law
       integer(ip) :: critical
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      call choose_parts(self%settings%forces, law, pair_parameters(self%settings))
       call find_expected_speed(self)
-      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected%speed, stable, critical, &
-                                 depth, length, damped, mobility_of_walls(self))
+      call stable_step_of_shapes(self%law, self%integrator%stability(), self%bodies, self%expected%speed, stable, &
+                                 critical, depth, length, damped, mobility_of_walls(self))
       has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
       call reduce_to_greatest(self%comm, has_free)
       limiting = 0_lp
@@ -60,7 +57,7 @@ contains
       self%expected%depth = found(1)
       self%expected%length = found(2)
       self%expected%damped = found(3)
-      if (sample%n > 0_ip) call consider_sample(self, law, sample, has_free(1))
+      if (sample%n > 0_ip) call consider_sample(self, sample, has_free(1))
       associate (settings => self%settings%integrate, duration => longest_run(self%settings))
          if (settings%dt > 0.0_wp) self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then
@@ -101,17 +98,16 @@ contains
    end subroutine check_number
 
    !> Take the stable step of bodies that will enter, if it is shorter.
-   subroutine consider_sample(self, law, sample, has_free)
+   subroutine consider_sample(self, sample, has_free)
       type(simulation_t), intent(inout) :: self
-      type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: sample
       !> 1 if there is a free body
       real(wp), intent(inout) :: has_free
       real(wp) :: stable, depth, length, damped
       integer(ip) :: critical
 
-      call stable_step_of_shapes(law, self%integrator%stability(), sample, self%expected%speed, stable, critical, &
-                                 depth, length, damped, mobility_of_walls(self))
+      call stable_step_of_shapes(self%law, self%integrator%stability(), sample, self%expected%speed, stable, &
+                                 critical, depth, length, damped, mobility_of_walls(self))
       has_free = 1.0_wp
       if (stable >= self%expected_stable_step) return
       self%expected_stable_step = stable

@@ -18,7 +18,8 @@ module polydem_relaxation
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_local_data, only: rebuild_local_data
-   use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_neighbours, only: neighbours_t
+   use polydem_new_neighbours, only: new_neighbours
    use polydem_source_locations, only: place_of
    use polydem_redistribution, only: have_boxes_left, redistribute
    use polydem_simulation, only: simulation_t

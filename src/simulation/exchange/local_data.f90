@@ -1,4 +1,5 @@
-!> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
+!> Parts of a simulation that depend on the bodies of a rank: measures of the force law, boxes, pair list with contact
+!> history, guards.
 module polydem_local_data
    use polydem_bodies_in_cell, only: find_folds
    use polydem_box_maker, only: new_box_maker
@@ -6,14 +7,12 @@ module polydem_local_data
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
-   use polydem_finder_statistics, only: finder_statistics_t
-   use polydem_force_law, only: force_law_t, new_force_law
+   use polydem_force_law, only: force_law_t
    use polydem_force_sums, only: start_sums
    use polydem_motion_check, only: displacement_limit, new_motion_check, shorter_step, warn_share
    use polydem_global_reductions, only: reduce_to_least
    use polydem_kinds, only: ip, wp
-   use polydem_neighbours, only: new_neighbours
-   use polydem_pair_parameters, only: pair_parameters
+   use polydem_neighbours, only: restart_neighbours
    use polydem_contact_flags, only: new_flag_limits
    use polydem_simulation, only: simulation_t, former_direction
    use polydem_stable_step, only: stiffest_product
@@ -23,9 +22,10 @@ module polydem_local_data
 
 contains
 
-   !> Rebuild the parts that depend on the bodies: force law, boxes, an empty pair list with contact history, guards.
+   !> Rebuild what depends on the bodies: measures of the force law, boxes, an empty pair list with contact history,
+   !> guards.
    subroutine rebuild_local_data(self, error, median_diameter)
-      !> The simulation, with its bodies and walls set
+      !> The simulation, with its bodies, walls, force law and finder
       type(simulation_t), intent(inout) :: self
       !> Allocated if the bodies or the settings are invalid
       type(error_t), allocatable, intent(inout) :: error
@@ -35,7 +35,7 @@ contains
       call self%named%find_slots(self%bodies)
       call self%named%mark_gone(self%bodies)
       call find_folds(self%bodies)
-      call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
+      call self%law%measure(self%bodies)
       if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
       call fit_table(self%law, self%contacts)
       self%loop%walls%n = 0_ip
@@ -57,7 +57,7 @@ contains
             median_diameter, self%domain%margin)
       end associate
       if (allocated(error)) return
-      call rebuild_neighbours(self, error)
+      call restart_neighbours(self%neighbours, self%boxes)
       call allocate_history(self)
       call new_flag_limits(self%loop%flag_limits, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
@@ -100,21 +100,6 @@ contains
          check%moving = self%moving(:n)
       end associate
    end subroutine rebuild_guard
-
-   !> Start with an empty pair list. The finder statistics are preserved.
-   subroutine rebuild_neighbours(self, error)
-      type(simulation_t), intent(inout) :: self
-      type(error_t), allocatable, intent(inout) :: error
-      type(finder_statistics_t) :: statistics
-
-      if (allocated(self%neighbours%finder)) statistics = self%neighbours%finder%work
-      associate (choice => self%settings%neighbours)
-         call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin, self%bodies%isa)
-      end associate
-      if (allocated(error)) return
-      self%neighbours%finder%work%value = statistics%value
-      self%neighbours%finder%work%seconds = statistics%seconds
-   end subroutine rebuild_neighbours
 
    !> Allocate the columns of the contact history: those of the force law, at the places known to its parts, then those
    !> of the guards.

@@ -14,11 +14,13 @@ module polydem_start_simulation
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
    use polydem_field_sums, only: accelerate_by_fields
-   use polydem_force_law, only: check_law
    use polydem_global_reductions, only: find_median, sum_exactly
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
+   use polydem_law_factory, only: choose_parts
    use polydem_local_data, only: limit_displacement, rebuild_local_data
+   use polydem_new_neighbours, only: choose_finder
+   use polydem_pair_parameters, only: pair_parameters
    use polydem_predict, only: move_walls, yield_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
@@ -62,7 +64,8 @@ contains
       real(wp) :: median_diameter
 
       call choose_instruction_set(self%bodies%isa, error)
-      call check_law(settings, 1_ip, error)
+      call choose_parts(settings%forces, self%law, pair_parameters(settings))
+      call self%law%check(settings, 1_ip, error)
       if (allocated(error)) return
       allocate (self%comm, source=comm)
       self%settings = settings
@@ -71,6 +74,7 @@ contains
       call prepare_stages(self)
       call new_traffic(self%settings, self%traffic)
       call new_integrator(settings%integrate, self%integrator)
+      call choose_finder(self%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, self%bodies%isa)
       call choose_all_fields(self)
       if (allocated(self%loads)) call prepare_loads(self)
       call draw_sample(self, sample, error)
