@@ -30,6 +30,7 @@ module benchmarks
    use b25_periodic_cell, only: run_periodic_cell
    use b26_sheared_cell, only: run_sheared_cell
    use b27_sources, only: run_sources
+   use b29_accelerations, only: run_accelerations
    use b30_loads, only: run_loads
    use b31_materials, only: run_materials
    use s32_flat_impact, only: run_flat_impact
@@ -43,7 +44,8 @@ module benchmarks
    !> Names in the order in which they run
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
       'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B10', 'B11', 'B12', 'B13', &
-      'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24', 'B25', 'B26', 'B27', 'B30', 'B31']
+      'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24', 'B25', 'B26', 'B27', 'B29', 'B30', &
+      'B31']
    !> Benchmarks without a short version
    character(len=8), parameter :: long_names(*) = [character(len=8) :: 'B17', 'B19', 'B20', 'B21']
 
@@ -119,6 +121,8 @@ contains
          call run_sheared_cell(table, thorough)
       case ('B27')
          call run_sources(table, thorough)
+      case ('B29')
+         call run_accelerations(table)
       case ('B30')
          call run_loads(table, thorough)
       case ('B31')
