@@ -21,10 +21,9 @@ module polydem_force_sums
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
-   !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]
-   integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10
-   !> Number of rows
-   integer, parameter :: n_terms = 10
+   !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]; number
+   integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10, &
+      n_terms = 10
    !> Number of bodies in a group for late terms
    integer(ip), parameter :: group = 16_ip
 
@@ -34,9 +33,10 @@ module polydem_force_sums
       real(wp), allocatable :: value(:, :)
       !> Whether a term was added to the sums of a body, (slot); the others are zero
       logical, allocatable :: has_terms(:)
-      !> Forces on each body that are no contacts, along x and y [N/m], and torques [N], (3, slot); the sums contain
-      !> them. Not allocated if there are none
+      !> Those of them that are no contacts, along x and y [N/m], and torques [N], (3, slot); allocated if there are any
       real(wp), allocatable :: field(:, :)
+      !> The part of these that is the same acceleration of all bodies, (2) [m/s2]
+      real(wp) :: acceleration(2) = 0.0_wp
       !> Whether `bodies` has the total forces of these sums on all bodies, not only on fixed ones
       logical :: are_in_bodies = .true.
    end type force_sums_t

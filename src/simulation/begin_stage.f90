@@ -75,7 +75,7 @@ contains
 
       call self%law%scale_friction(self%stages%friction_scale)
       call self%body_forces%configure(self%settings%forces)
-      call self%flight%start(self%settings%forces%gravity, allocated(self%body_forces%list) .or. &
+      call self%flight%start(self%settings%forces%gravity, self%body_forces%act() .or. &
                              self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
       do j = 1, size(self%walls)
          do k = 1, size(self%walls(j)%motions)

@@ -145,13 +145,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call self%body_forces%apply(self%bodies, self%force_sums)
+      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%force_sums)
       if (.not. allocated(self%law%constraint)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
       call self%law%constraint%apply(self%dt, self%loop%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
       call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
-      call self%body_forces%apply(self%bodies, self%force_sums)
+      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%force_sums)
       call select_walls(self%bodies, self%contacts, self%loop%walls)
    end subroutine add_other_forces
 

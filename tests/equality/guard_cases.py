@@ -125,6 +125,7 @@ VARIED = {
     "forces.restitution": "0.3",
     "forces.tilt_damping": "0.5", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
+    "forces.local_damping": "0.3", "forces.shake": "5, 20", "forces.shake_frequency": "50", "forces.turn_rate": "2",
     "forces.drag": "2", "forces.cohesion": "2e4",
     "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
     "wall.one.material": "one", "material.one.density": "1000", "contact_pair.one.materials": "one', 'one",
@@ -157,6 +158,7 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
               "contact_pair.one.materials": VARIED["contact_pair.one.materials"]},
           "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
           **{f"sample.{key}": {"output.series_interval": "1e-3"} for key in ("area", "low", "high")},
+          "forces.shake": {"forces.shake_frequency": "40"}, "forces.shake_frequency": {"forces.shake": "5, 10"},
           "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",

@@ -60,6 +60,8 @@ CAPABILITIES = {
         wall="material = 'soft'", upper="material = 'soft'"),
     "cohesion": Capability(forces="cohesion = 200"),
     "drag": Capability(forces="drag = 4"),
+    "local_damping": Capability(forces="local_damping = 0.2"),
+    "shaken_gravity": Capability(forces="shake = 30, 20 shake_frequency = 90"),
     "hunt_crossley": Capability(forces="damping = 'hunt_crossley' damping_coefficient = 1"),
     "area_law": Capability(forces="law = 'area'"),
     "exact_friction": Capability(forces="friction = 'exact'"),
@@ -90,6 +92,7 @@ CAPABILITIES = {
 #: Pairs that the program refuses, and a part of its message
 REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
+    ("exact_friction", "local_damping"): "whose forces depend on the motion without it",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",
     ("pieces", "traffic"): "cannot be combined with &source and &sink",

@@ -31,6 +31,7 @@ module benchmarks
    use b26_sheared_cell, only: run_sheared_cell
    use b27_sources, only: run_sources
    use b28_pieces, only: run_pieces
+   use b29_accelerations, only: run_accelerations
    use b30_loads, only: run_loads
    use b31_materials, only: run_materials
    use s32_flat_impact, only: run_flat_impact
@@ -45,7 +46,7 @@ module benchmarks
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
       'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B10', 'B11', 'B12', 'B13', &
       'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24', 'B25', 'B26', 'B27', 'B28', &
-      'B30', 'B31']
+      'B29', 'B30', 'B31']
    !> Benchmarks without a short version
    character(len=8), parameter :: long_names(*) = [character(len=8) :: 'B17', 'B19', 'B20', 'B21']
 
@@ -123,6 +124,8 @@ contains
          call run_sources(table, thorough)
       case ('B28')
          call run_pieces(table, thorough)
+      case ('B29')
+         call run_accelerations(table)
       case ('B30')
          call run_loads(table, thorough)
       case ('B31')

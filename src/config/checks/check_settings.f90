@@ -58,6 +58,7 @@ contains
                   'because a smaller value needs a very small time step; give ''damping_coefficient'' instead')
             end if
          end associate
+         call check_gravity(settings, group, error)
       end associate
       if (settings%output%csv .and. .not. settings%output%series_interval > 0.0_wp) then
          associate (group => instances(index_of_instance(instances, 'output')))
@@ -79,6 +80,28 @@ contains
          end associate
       end if
    end subroutine check_settings
+
+   !> Check the entries of gravity that changes.
+   pure subroutine check_gravity(settings, group, error)
+      type(settings_t), intent(in) :: settings
+      !> The group &forces
+      type(instance_t), intent(in) :: group
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: key
+
+      associate (forces => settings%forces)
+         if (any(abs(forces%shake) > 0.0_wp) .neqv. forces%shake_frequency > 0.0_wp) then
+            key = 'shake'
+            if (forces%shake_frequency > 0.0_wp) key = 'shake_frequency'
+            call raise(error, input_error, group%values(row_of(group, key))%place// &
+               ': ''shake'' and ''shake_frequency'' in &forces need each other; give both or none')
+         end if
+         if (abs(forces%turn_rate) > 0.0_wp .and. .not. any(abs(forces%gravity) > 0.0_wp) .and. &
+             size(settings%stage) == 0) call raise(error, input_error, &
+            group%values(row_of(group, 'turn_rate'))%place//': ''turn_rate'' in &forces turns gravity, which is '// &
+            '0; give ''gravity'', for example 0, -9.81')
+      end associate
+   end subroutine check_gravity
 
    !> Check entries of &scene against each other.
    pure subroutine check_scene(settings, group, error)

@@ -22,7 +22,7 @@ contains
       call row%set('elastic_work', balance%elastic_work, 'J/m', 'work of the elastic normal forces')
       call row%set('damping_work', balance%damping_work, 'J/m', 'work of the normal damping')
       call row%set('friction_work', balance%friction_work, 'J/m', 'work of the tangential forces')
-      call row%set('wall_work', balance%wall_work, 'J/m', 'work done by moving walls')
+      call row%set('wall_work', balance%wall_work, 'J/m', 'work done by moving walls and changing gravity')
       if (balance%has_loads) then
          call row%set('load_work', balance%load_work, 'J/m', 'work of loads on walls')
          call row%set('load_damping_work', balance%load_damping_work, 'J/m', 'work of the damping of these walls')

@@ -86,29 +86,40 @@ contains
    end subroutine add_term
 
    !> Add the impulses of forces on some bodies that are no contacts to their wall channels, times a weight, as of a
-   !> fixed body at rest.
-   pure subroutine add_fields(bodies, field, weight, first, last, wall_channels)
+   !> fixed body at rest. Their powers are among those of damping. That of an acceleration from outside moves from there
+   !> to the power of fixed bodies.
+   pure subroutine add_fields(bodies, field, acceleration, weight, first, last, channels, wall_channels)
       type(bodies_t), intent(in) :: bodies
       !> Forces along x and y [N/m] and torques [N], (3, slot)
       real(wp), intent(in) :: field(:, :)
+      !> The acceleration of all bodies that they contain, (2) [m/s2]
+      real(wp), intent(in) :: acceleration(2)
       !> Factor of what is added
       real(wp), intent(in) :: weight
       !> First and last slot
       integer(ip), intent(in) :: first, last
+      !> Channels of all bodies, (n_channels, slot) [W/m]
+      real(wp), intent(inout) :: channels(:, :)
       !> Wall channels of all bodies, (n_wall_channels, slot)
       real(wp), intent(inout) :: wall_channels(:, :)
-      real(wp) :: torque
+      real(wp) :: power, torque
       integer(ip) :: s
 
       do s = first, last
-         associate (x => bodies%position(:, s), f => field(:, s), channels => wall_channels(:, s))
+         associate (x => bodies%position(:, s), f => field(:, s), on_walls => wall_channels(:, s))
             torque = (x(1)*f(2) - x(2)*f(1)) + f(3)
-            channels(2) = channels(2) + weight*f(1)
-            channels(3) = channels(3) + weight*f(2)
-            channels(4) = channels(4) + weight*torque
-            channels(5) = channels(5) + weight*(abs(f(1)) + abs(f(2)))
-            channels(6) = channels(6) + weight*abs(torque)
+            on_walls(2) = on_walls(2) + weight*f(1)
+            on_walls(3) = on_walls(3) + weight*f(2)
+            on_walls(4) = on_walls(4) + weight*torque
+            on_walls(5) = on_walls(5) + weight*(abs(f(1)) + abs(f(2)))
+            on_walls(6) = on_walls(6) + weight*abs(torque)
          end associate
+      end do
+      if (.not. any(abs(acceleration) > 0.0_wp)) return
+      do s = first, last
+         power = weight*bodies%mass(s)*(acceleration(1)*bodies%velocity(1, s) + acceleration(2)*bodies%velocity(2, s))
+         channels(2, s) = channels(2, s) - power
+         wall_channels(1, s) = wall_channels(1, s) + power
       end do
    end subroutine add_fields
 

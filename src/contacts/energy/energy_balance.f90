@@ -1,8 +1,8 @@
 !> Energy and momentum balance of a run.
 !>
 !> Work is the integral of power over time, by the trapezoidal rule between the ends of steps. Its channels are the
-!> elastic normal forces, damping and friction (all contacts; usually negative), and moving walls. Powers are those of
-!> the final velocities of a step. With predicted velocities each jump of a force would leave a residual. Force times
+!> elastic normal forces, damping and friction (all contacts; usually negative), and moving walls with gravity that
+!> changes. Powers are those of the final velocities of a step. With predicted velocities each jump of a force would leave a residual. Force times
 !> final velocity is exactly the energy that velocity Verlet adds from the middle of a step to the middle of the next.
 !> With the potential energy of gravity, kinetic + potential - work is constant up to the error of integration.
 !> The area law has no potential energy: its elastic work does not return to zero when contacts open. The elastic work
@@ -82,7 +82,7 @@ module polydem_energy_balance
       real(wp) :: damping_work = 0.0_wp
       !> Work of the tangential forces [J/m]
       real(wp) :: friction_work = 0.0_wp
-      !> Work done by moving walls [J/m]
+      !> Work done by moving walls, and by gravity that changes [J/m]
       real(wp) :: wall_work = 0.0_wp
       !> Whether walls yield to loads
       logical :: has_loads = .false.
@@ -182,7 +182,8 @@ contains
       integer(ip), intent(in) :: first, last
 
       call add_powers(bodies, forces, weight, first, last, sums%power_sum)
-      if (allocated(forces%field)) call add_fields(bodies, forces%field, weight, first, last, sums%wall_sum)
+      if (allocated(forces%field)) call add_fields(bodies, forces%field, forces%acceleration, weight, first, last, &
+                                                  sums%power_sum, sums%wall_sum)
       if (last < first .or. .not. any(abs(gravity) > 0.0_wp)) return
       call add_torques(last - first + 1_ip, weight, gravity, bodies%mass(first), bodies%position(1, first), &
                        sums%torque(first))

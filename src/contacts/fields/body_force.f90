@@ -24,14 +24,16 @@ module polydem_body_force
 
    abstract interface
       !> Add the force on up to `block_size` free bodies. Several threads call it for different bodies.
-      pure subroutine add(self, bodies, slots, force)
+      pure subroutine add(self, others, bodies, slots, force)
          import :: bodies_t, block_size, body_force_t, ip, wp
          class(body_force_t), intent(in) :: self
+         !> Contact forces and weight along x and y [N/m], and the torques of contacts [N], (3, body)
+         real(wp), intent(in) :: others(3, block_size)
          !> Bodies with the positions and velocities of this step
          type(bodies_t), intent(in) :: bodies
          !> Slots of the bodies
          integer(ip), intent(in) :: slots(:)
-         !> Forces along x and y [N/m] and torques [N], (3, body)
+         !> Forces along x and y [N/m] and torques [N] on them that are no contacts, (3, body)
          real(wp), intent(inout) :: force(3, block_size)
       end subroutine add
    end interface

@@ -2,10 +2,12 @@
 module polydem_body_forces
    use polydem_bodies, only: bodies_t, block_size
    use polydem_body_force, only: body_force_t
+   use polydem_changing_gravity, only: changes_gravity, changing_gravity_t, new_changing_gravity
    use polydem_drag, only: drag_t
    use polydem_field_sums, only: add_field, reserve_field
-   use polydem_force_sums, only: force_sums_t
+   use polydem_force_sums, only: force_sums_t, of_normal, of_tangential, sum_torque, sum_x, sum_y
    use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_local_damping, only: local_damping_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -19,10 +21,13 @@ module polydem_body_forces
 
    !> The forces that act in a run
    type :: body_forces_t
+      !> How gravity changes; not allocated if it is constant
+      type(changing_gravity_t), allocatable :: changing
       !> The forces, in the order in which they are added; not allocated if there is none
       type(listed_force_t), allocatable :: list(:)
    contains
       procedure :: apply
+      procedure :: act
       procedure :: configure
       procedure :: rate
       procedure :: description
@@ -37,6 +42,9 @@ contains
       type(body_forces_t), intent(out) :: forces
 
       if (settings%drag > 0.0_wp) call forces%add(drag_t(name='drag'), settings)
+      if (changes_gravity(settings)) forces%changing = new_changing_gravity(settings)
+      ! It damps the total force, so it is the last one.
+      if (settings%local_damping > 0.0_wp) call forces%add(local_damping_t(name='local damping'), settings)
    end subroutine choose_body_forces
 
    !> Append a force.
@@ -58,38 +66,62 @@ contains
       call move_alloc(longer, self%list)
    end subroutine add
 
-   !> Add the forces on all free bodies to the sums of contact forces.
-   subroutine apply(self, bodies, sums)
+   !> Whether there is any force
+   pure logical function act(self)
       class(body_forces_t), intent(in) :: self
+
+      act = allocated(self%list) .or. allocated(self%changing)
+   end function act
+
+   !> Add the forces on all free bodies to the sums of contact forces.
+   subroutine apply(self, gravity, time, bodies, sums)
+      class(body_forces_t), intent(in) :: self
+      !> Constant acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Simulated time [s]
+      real(wp), intent(in) :: time
       !> Bodies with the positions and velocities of this step
       type(bodies_t), intent(in) :: bodies
       !> Sums of the contact forces of this step
       type(force_sums_t), intent(inout) :: sums
       integer(ip) :: low
 
-      if (.not. allocated(self%list)) return
+      if (.not. self%act()) return
       call reserve_field(bodies%n, sums)
+      if (allocated(self%changing)) sums%acceleration = self%changing%acceleration(gravity, time)
       !$omp parallel do if (size(bodies%free) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, sums) private(low)
+      !$omp    shared(self, gravity, bodies, sums) private(low)
       do low = 1_ip, size(bodies%free, kind=ip), block_size
-         call apply_block(self, bodies, bodies%free(low:min(low + block_size - 1_ip, size(bodies%free, kind=ip))), sums)
+         call apply_block(self, gravity, bodies, &
+                          bodies%free(low:min(low + block_size - 1_ip, size(bodies%free, kind=ip))), sums)
       end do
       !$omp end parallel do
    end subroutine apply
 
    !> Add the forces on up to `block_size` bodies.
-   pure subroutine apply_block(self, bodies, slots, sums)
+   pure subroutine apply_block(self, gravity, bodies, slots, sums)
       type(body_forces_t), intent(in) :: self
+      real(wp), intent(in) :: gravity(2)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: slots(:)
       type(force_sums_t), intent(inout) :: sums
-      real(wp) :: force(3, block_size)
+      real(wp) :: others(3, block_size), force(3, block_size)
       integer :: k
 
-      force = 0.0_wp
-      do k = 1, size(self%list)
-         call self%list(k)%force%add(bodies, slots, force)
+      do k = 1, size(slots)
+         associate (value => sums%value(:, slots(k)), m => bodies%mass(slots(k)))
+            others(1, k) = value(sum_x(of_normal)) + value(sum_x(of_tangential)) + m*gravity(1)
+            others(2, k) = value(sum_y(of_normal)) + value(sum_y(of_tangential)) + m*gravity(2)
+            others(3, k) = value(sum_torque(of_normal)) + value(sum_torque(of_tangential))
+            force(1:2, k) = m*sums%acceleration
+            force(3, k) = 0.0_wp
+         end associate
       end do
+      if (allocated(self%list)) then
+         do k = 1, size(self%list)
+            call self%list(k)%force%add(others, bodies, slots, force)
+         end do
+      end if
       call add_field(slots, force(:, :size(slots)), sums)
    end subroutine apply_block
 
@@ -111,6 +143,7 @@ contains
       integer :: k
 
       rate = 0.0_wp
+      if (allocated(self%changing)) rate = self%changing%rate()
       if (.not. allocated(self%list)) return
       do k = 1, size(self%list)
          rate = max(rate, self%list(k)%force%rate)
@@ -124,6 +157,7 @@ contains
       integer :: k
 
       text = ''
+      if (allocated(self%changing)) text = ', changing gravity'
       if (.not. allocated(self%list)) return
       do k = 1, size(self%list)
          text = text//', '//trim(self%list(k)%force%name)

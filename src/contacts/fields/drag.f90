@@ -28,13 +28,16 @@ contains
    end subroutine configure
 
    !> Add the drag.
-   pure subroutine add(self, bodies, slots, force)
+   pure subroutine add(self, others, bodies, slots, force)
       class(drag_t), intent(in) :: self
+      real(wp), intent(in) :: others(3, block_size)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: slots(:)
       real(wp), intent(inout) :: force(3, block_size)
       integer(ip) :: k
 
+      associate (unused => others)
+      end associate
       do k = 1_ip, size(slots, kind=ip)
          associate (s => slots(k))
             force(1:2, k) = force(1:2, k) - self%rate*bodies%mass(s)*bodies%velocity(:, s)

@@ -47,7 +47,7 @@ contains
       call start_sums(self%bodies%n, self%force_sums)
       ! The border of a sheared cell acts on bodies that nothing touches.
       call self%flight%start(self%settings%forces%gravity, &
-                             allocated(self%body_forces%list) .or. self%bodies%cell%is_sheared .or. &
+                             self%body_forces%act() .or. self%bodies%cell%is_sheared .or. &
                              self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
       self%loop%incidence = incidence_t()
       call list_moving(self)

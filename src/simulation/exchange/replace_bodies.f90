@@ -22,7 +22,7 @@ module polydem_replace_bodies
    use polydem_packed_bodies, only: join_packed, pack_bodies, packed_bodies_t
    use polydem_packed_history, only: pack_pairs
    use polydem_packed_state, only: pack_state, packed_state_t, unpack_state
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: simulation_t, time_of
    use polydem_sort, only: ascending_order, place_in
    use polydem_strings, only: to_text
    implicit none
@@ -171,7 +171,7 @@ contains
 
       associate (gravity => self%settings%forces%gravity)
          call begin_sums(added%n, sums)
-         call self%body_forces%apply(added, sums)
+         call self%body_forces%apply(gravity, time_of(self), added, sums)
          call total_forces(gravity, sums, added)
          call self%integrator%start_accelerations(gravity, added)
          if (.not. self%integrator%starts_from_forces) call accelerate_by_fields(sums, added)

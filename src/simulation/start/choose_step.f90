@@ -20,6 +20,8 @@ module polydem_choose_step
    real(wp), parameter :: most_steps = 1.0e15_wp
    !> Greatest change of a velocity in a step by a force that is no contact, as a share
    real(wp), parameter :: greatest_change = 0.1_wp
+   !> Angle of a full turn [rad]
+   real(wp), parameter :: two_pi = 6.283185307179586_wp
 
 contains
 
@@ -117,16 +119,24 @@ contains
       self%expected%damped = damped
    end subroutine consider_sample
 
-   !> Check that no force that is no contact changes velocities by much in a step.
+   !> Check that no force that is no contact changes velocities, or itself, by much in a step.
    subroutine check_rate(self, error)
       type(simulation_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
 
-      if (self%dt*self%body_forces%rate() > greatest_change) call raise(error, input_error, &
-         place_of(self%settings, 'forces', 'drag')//': with dt = '//to_text(self%dt)//' s a rate of '// &
-         to_text(self%body_forces%rate())//' 1/s changes a velocity by more than a tenth in a step. Set dt in '// &
-         '&integrate to at most '//to_text(greatest_change/self%body_forces%rate(), 2)// &
-         ', or decrease drag in &forces')
+      character(len=:), allocatable :: key
+
+      if (self%dt*self%body_forces%rate() <= greatest_change) return
+      associate (forces => self%settings%forces, rate => self%body_forces%rate())
+         key = 'drag'
+         if (two_pi*abs(forces%turn_rate) >= rate) key = 'turn_rate'
+         if (two_pi*forces%shake_frequency >= rate) key = 'shake_frequency'
+         call raise(error, input_error, place_of(self%settings, 'forces', key)//': with dt = '//to_text(self%dt)// &
+                    ' s a rate of '//to_text(rate)//' 1/s changes '// &
+                    trim(merge('a velocity  ', 'acceleration', key == 'drag'))//' by more than a tenth in a step. '// &
+                    'Set dt in &integrate to at most '//to_text(greatest_change/rate, 2)//', or decrease '//key// &
+                    ' in &forces')
+      end associate
    end subroutine check_rate
 
    !> A number with three digits that does not exceed another one

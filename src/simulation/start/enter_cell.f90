@@ -67,7 +67,7 @@ contains
       end associate
    end subroutine enter_cell
 
-   !> Check that no constraint on velocities acts in a sheared cell.
+   !> Check that no constraint on velocities acts in a sheared cell, or with local damping.
    subroutine check_constraint(self, error)
       !> The simulation with its force law
       type(simulation_t), intent(in) :: self
@@ -77,6 +77,9 @@ contains
       if (self%bodies%cell%is_sheared .and. allocated(self%law%constraint)) call raise(error, input_error, &
          place_of(self%settings, 'cell', 'shear_rate')//': ''shear_rate'' in &cell cannot be combined with this '// &
          '''friction'' in &forces, which does not know the velocity of the border; use cundall_strack')
+      if (self%settings%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
+         input_error, place_of(self%settings, 'forces', 'local_damping')//': ''local_damping'' in &forces cannot '// &
+         'be combined with this ''friction'', whose forces depend on the motion without it; use drag')
    end subroutine check_constraint
 
    !> Add up the bodies of all ranks that were outside. Collective.

@@ -2,8 +2,8 @@
 !>
 !> It is the greatest of three: the difference of the velocities of any two bodies at the start, including their spins;
 !> the speed after a fall of the highest free body or source to the lowest point of the scene or the top of a sink (with
-!> moving walls: through the whole extent); and the greatest speed of a wall. Each is an upper bound that does not
-!> depend on the frame of reference.
+!> moving walls: through the whole extent), with what shaken gravity adds; and the greatest speed of a wall. Each is an
+!> upper bound that does not depend on the frame of reference. Gravity that turns points along either axis.
 module polydem_expected_speed
    use polydem_elementary, only: hypotenuse
    use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
@@ -15,6 +15,9 @@ module polydem_expected_speed
    private
    public :: find_expected_speed
 
+   !> The number pi
+   real(wp), parameter :: pi = 3.141592653589793_wp
+
 contains
 
    !> Set the expected speed and its origin: the entry `speed` of &integrate, or an estimate. Collective; all ranks get
@@ -22,7 +25,7 @@ contains
    subroutine find_expected_speed(self)
       !> The simulation with settings, ranks, bodies and walls; `expected` is set
       type(simulation_t), intent(inout) :: self
-      real(wp) :: start, fall, in_stage, wall
+      real(wp) :: start, fall, wall
       integer :: k
 
       associate (expected => self%expected)
@@ -30,15 +33,19 @@ contains
          expected%origin = 'speed in &integrate'
          if (expected%speed > 0.0_wp) return
          call find_start_speed(self, start)
-         call find_fall_speed(self, self%settings%forces%gravity, fall)
+         fall = 0.0_wp
+         call consider_fall(self, self%settings%forces%gravity, fall)
          do k = 1, size(self%settings%stage)
             if (size(self%settings%stage(k)%gravity) == 2) then
-               call find_fall_speed(self, self%settings%stage(k)%gravity, in_stage)
+               call consider_fall(self, self%settings%stage(k)%gravity, fall)
             else
-               call find_fall_speed(self, self%stages%gravity, in_stage)
+               call consider_fall(self, self%stages%gravity, fall)
             end if
-            fall = max(fall, in_stage)
          end do
+         associate (forces => self%settings%forces)
+            if (forces%shake_frequency > 0.0_wp) &
+               fall = fall + hypotenuse(forces%shake(1), forces%shake(2))/(pi*forces%shake_frequency)
+         end associate
          wall = 0.0_wp
          do k = 1, size(self%walls)
             wall = max(wall, greatest_wall_speed(self%walls(k), self%bodies%radius, longest_run(self%settings)))
@@ -76,6 +83,24 @@ contains
       speed = 0.0_wp
       if (all(greatest >= least)) speed = hypotenuse(greatest(1) - least(1), greatest(2) - least(2))
    end subroutine find_start_speed
+
+   !> Take the speed of a fall if it is greater, in each quarter of a turn if gravity turns [m/s].
+   subroutine consider_fall(self, gravity, greatest)
+      type(simulation_t), intent(inout) :: self
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Greatest speed so far
+      real(wp), intent(inout) :: greatest
+      real(wp) :: turned(2), speed
+      integer :: k
+
+      turned = gravity
+      do k = 1, merge(4, 1, abs(self%settings%forces%turn_rate) > 0.0_wp)
+         call find_fall_speed(self, turned, speed)
+         greatest = max(greatest, speed)
+         turned = [-turned(2), turned(1)]
+      end do
+   end subroutine consider_fall
 
    !> Find the speed after a fall of the highest free body to the lowest point of the scene [m/s].
    subroutine find_fall_speed(self, gravity, speed)
