@@ -2,7 +2,7 @@
 #
 # One folder of src is one library with its own folder of module files. A layer sees the modules of the layers that it
 # names in USES and no others, not even those of theirs: the links are PRIVATE, so what a layer uses is linked into a
-# program but not shown to it. The test `layers` tries every pair that is not named.
+# program but not shown to it. The test `layers` compares what it sees with what it uses.
 function(polydem_layer name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;USES")
   add_library(polydem_${name} STATIC ${arg_SOURCES})

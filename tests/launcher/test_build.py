@@ -1,6 +1,5 @@
 """Builds and tests of the toy."""
 
-import fcntl
 import os
 import re
 import shutil
@@ -217,17 +216,8 @@ class Build(Toy):
         self.assertNotEqual(code, 0)
         self.assertEqual(output.splitlines()[-1], "0 passed, 1 failed")
         for label in ("fin", "c-d", "unheard_of"):
-            said = f"polydem: no test has the label {label}; choose from broken c.d fine\n"
-            self.assertEqual(self.call("test", label), (2, "", said))
-
-    def test_an_unknown_label_is_refused_before_anything_is_built(self):
-        said = "polydem: no test has the label nonsense; choose from broken c.d fine\n"
-        self.assertEqual(self.call("test", "nonsense"), (2, "", said))
-        self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src", "app", "polydem")))
-        # A label that is new is known, too.
-        self.write("CMakeLists.txt", "\n".join(self.read("CMakeLists.txt")).replace("broken", '"broken;fresh"') + "\n")
-        code, output, _ = self.call("test", "fresh")
-        self.assertEqual((code != 0, output.splitlines()[-1]), (True, "0 passed, 1 failed"))
+            code, output, _ = self.call("test", label)
+            self.assertEqual((code != 0, output.splitlines()[-1]), (True, "0 passed, 0 failed"))
 
     def test_only_tests_install_what_tests_need(self):
         self.write(".venv/bin/python", '#!/bin/bash\necho "$*" >>"$NOTES/asked"\n')
@@ -251,21 +241,3 @@ class Build(Toy):
         os.remove(os.path.join(self.folder, "asked"))
         self.assertEqual(self.call("test", "fine")[0], 0)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "asked")))
-
-    def test_a_plan_waits_for_nobody(self):
-        self.write_python()
-        os.makedirs(os.path.join(self.folder, "build"), exist_ok=True)
-        lock = os.path.join(self.folder, "build", ".lock")
-        said = "polydem: another call of ./polydem builds"
-        for is_built in (False, True):
-            if is_built:
-                self.assertEqual(self.call("--version")[0], 0)
-            with open(lock, "w", encoding="utf-8") as held:
-                fcntl.flock(held, fcntl.LOCK_EX)
-                for option in ("--dry-run", "--report-only"):
-                    code, output, messages = self.call("paper", option)
-                    self.assertEqual((code, output.startswith("-m\npolydem_post\npaper\n")), (1 - is_built, is_built))
-                    self.assertEqual(messages, said + (": this is for the program as it is\n" if is_built else
-                                                       "; call again when it has ended\n"))
-        code, _, messages = self.call("paper", "--dry-run")
-        self.assertEqual((code, messages), (0, ""))

@@ -57,9 +57,6 @@ class Words(Toy):
         self.assertEqual(self.call("fly"), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
         for words in (("help", "fly"), ("fly", "--help")):
             self.assertEqual(self.call(*words), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
-        for word, verb in (("rnu", "run"), ("rum", "run"), ("plott", "plot"), ("heck", "check"), ("infor", "info")):
-            said = f"polydem: there is no verb {word} (did you mean {verb}?); see ./polydem --help\n"
-            self.assertEqual(self.call(word), (2, "", said))
         said = "polydem: the verb comes first: ./polydem VERB --threads ...; see ./polydem --help\n"
         self.assertEqual(self.call("--threads", "2", "run", "a.nml"), (2, "", said))
         self.assertEqual(self.call("test", "a", "b")[0], 2)

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 LONGEST_FILE, LONGEST_PROCEDURE = 400, 60
-#: Columns by suffix; 124 is what pFUnit can take
+#: Columns by suffix, unless fortitude or ruff counts them; 124 is what pFUnit can take
 WIDEST = {".pf": 124, **dict.fromkeys((".js", ".css", ".html", ".sh", ""), 120)}
-TEXTS = {".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff", ".yaml"} | set(WIDEST)
+TEXTS = {".f90", ".in", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff", ".yaml"} | set(WIDEST)
 FOLDERS = {"src", "tests", "postproc", "inputs"}
 TOP_LEVEL = FOLDERS | {".ci", ".editorconfig", ".fortitude.toml", ".fprettify.rc", ".gitignore", ".ruff.toml",
                        "CITATION.cff", "CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "polydem"}
@@ -23,10 +23,8 @@ FORBIDDEN = [(re.compile(pattern), re.compile(allowed), message) for pattern, al
     (r"\bcall +omp_set_num_threads\b", "^src/(app|laboratory|run)/",
      "the layers app, laboratory and run set the threads"),
     (r"^(save|data)\b(?! *[=%(])|^[^:]*, *save\b[^:]*::", "^$", "no save, no data: state lives in arguments"),
-    (r"^#", "^$", "no preprocessor: CMake chooses files"),
+    (r"^[^:]*, *pointer\b[^:]*::", "^src/platform/", "no pointers: use allocatables and integer links"),
     (r"\bgo *to\b", "^$", "go to is not used here"),
-    (r"^(?!!).*(?<![\w.])(\d+\.\d*|\.\d+|\d+(?=[ed][+-]?\d))([ed][+-]?\d+)?(?![\w.])", "^$",
-     "a real number without a kind"),
     (r"%(law|damping|friction) *(==|/=)", "/law_factory.f90$",
      "only `choose_parts` of law_factory.f90 knows these words"),
     (r"(?<![%\w])(a?(sin|cos|tan)h?|atan2|exp|log|log10|(log_)?gamma|hypot|norm2|erf(c(_scaled)?)?|bessel_[jy].) *\(",
@@ -41,9 +39,8 @@ FORBIDDEN = [(re.compile(pattern), re.compile(allowed), message) for pattern, al
 )]
 DECLARATION = re.compile(r"(integer|real|logical|complex|character|type|class|procedure)\b[^:]*::")
 OPENING = [(kind, re.compile(pattern)) for kind, pattern in (
-    ("module", r"module +(?!procedure\b)(\w+)$"),
+    ("module", r"(?:sub)?module *(?:\([^)]*\))? *(?!procedure\b)(\w+)$"),
     ("program", r"program +(\w+)$"),
-    ("module", r"submodule *\([^)]*\) *(\w+)$"),
     ("interface", r"(?:abstract +)?interface\b *(.*)$"),
     ("type", r"type *(?:,[^:]*)?(?::: *| )(\w+)$"),
     ("procedure", r"(?:(?:[a-z]\w*|[a-z]\w* *\([^()]*(?:\([^()]*\)[^()]*)*\)) +)*(?:subroutine|function) +(\w+)"),
@@ -64,7 +61,10 @@ class Scope:
             if code == "contains":
                 return
             if DECLARATION.match(code):
-                yield line, code, [re.match(r"\w*", part.strip())[0] for part in split_commas(code.split("::", 1)[1])]
+                names = code.split("::", 1)[1]
+                while (outer := re.sub(r"[(\[][^()\[\]]*[)\]]", "", names)) != names:
+                    names = outer
+                yield line, code, [re.match(r"\w*", part.strip())[0] for part in names.split(",")]
 
 
 def statements_of(lines):
@@ -87,26 +87,18 @@ def statements_of(lines):
 def scopes_of(statements):
     """All scopes, the file itself first."""
     scopes = [Scope()]
-    stack = list(scopes)
+    stack = [*scopes]
     for line, code in statements:
+        opened = next(((kind, match[1]) for kind, pattern in OPENING if (match := pattern.match(code))), None)
         if ENDING.match(code) and len(stack) > 1:
             scope = stack.pop()
             scope.length = line - scope.line + 1
-            continue
-        opened = next(((kind, match[1]) for kind, pattern in OPENING if (match := pattern.match(code))), None)
-        if opened and not code.startswith("!"):
+        elif opened:
             stack.append(Scope(*opened, line, code, stack[-1]))
             scopes.append(stack[-1])
         else:
             stack[-1].statements.append((line, code))
     return scopes
-
-
-def split_commas(text):
-    """Split at commas that stand outside parentheses."""
-    while (inner := re.sub(r"[(\[][^()\[\]]*[)\]]", "", text)) != text:
-        text = inner
-    return text.split(",")
 
 
 # --- rules --------------------------------------------------------------------------------------------------------
@@ -134,19 +126,15 @@ def check_source(path, lines):
                     if pattern.search(code) and not allowed.search(path))
     if len(lines) - 1 > LONGEST_FILE:
         yield len(lines) - 1, f"{len(lines) - 1} lines, more than {LONGEST_FILE}"
-    makes_pointers = any("c_f_pointer" in code for _, code in statements)
     for scope in scopes:
         if scope.kind == "procedure" and scope.length > LONGEST_PROCEDURE:
             yield scope.line, f"{scope.name} has {scope.length} lines, more than {LONGEST_PROCEDURE}"
-        for line, code, _ in scope.declarations():
-            attributes = code.split("::")[0]
-            if scope.kind == "module" and not re.search(r"\bparameter\b|^procedure", attributes):
-                yield line, "a variable of a module: state lives in arguments"
-            if re.search(r", *pointer\b", attributes) and not makes_pointers:
-                yield line, "no pointers: use allocatables and integer links (only c_f_pointer needs one)"
-        module, stem = f"{scope.name}_", f"polydem_{Path(path).stem}_"
-        if scope.kind == "module" and scope.code.startswith("module ") and not stem.startswith(module):
-            yield scope.line, f"module {scope.name} is not named as its file"
+        if scope.kind == "module":
+            yield from ((line, "a variable of a module: state lives in arguments")
+                        for line, code, _ in scope.declarations()
+                        if not re.match(r"procedure|.*\bparameter\b.*::", code))
+            if scope.code.startswith("module ") and not f"polydem_{Path(path).stem}_".startswith(f"{scope.name}_"):
+                yield scope.line, f"module {scope.name} is not named as its file"
     yield from check_imports(statements)
     yield from check_comments(scopes, lines)
 
@@ -167,21 +155,17 @@ def check_comments(scopes, lines):
     """A comment !> above modules, types, their components, and what others call with its arguments."""
     public, inherited = public_names(scopes)
     for scope in scopes[1:]:
-        in_interface = scope.outer.kind == "interface"
-        is_called = scope.kind == "procedure" and (scope.name in public or in_interface)
+        is_called = scope.kind == "procedure" and (scope.name in public or scope.outer.kind == "interface")
         if (is_called or scope.kind in ("type", "module")) and not is_explained(lines, scope.line):
             yield scope.line, f"no comment !> above {scope.name}"
         # Arguments are explained once: by the manual of a C function, by the abstract type of an extension.
         explained = "bind(c" in scope.code.replace(" ", "") or scope.name in inherited
         arguments = re.search(r"\w+ *\(([^)]*)\)(?: *result|$| *bind)", scope.code) if is_called else None
-        arguments = {name.strip() for name in arguments[1].split(",")} if arguments else set()
-        hides = any(code == "private" for _, code in scope.statements)
+        arguments = {name.strip() for name in arguments[1].split(",")} if arguments and not explained else set()
+        is_open = scope.kind == "type" and all(code != "private" for _, code in scope.statements)
         for line, code, names in scope.declarations():
-            if scope.kind == "type":
-                wanted = not hides and not re.search(r", *private\b", code.split("::")[0])
-            else:
-                wanted = is_called and not explained and arguments & set(names) and names != ["self"] and not (
-                    is_named_as_its_type(code, names))
+            wanted = (is_open and not re.search(r", *private\b.*::", code)) or (
+                arguments & set(names) and names != ["self"] and not is_named_as_its_type(code, names))
             if wanted and not is_explained(lines, line):
                 yield line, f"no comment !> above {', '.join(names)}"
 
@@ -223,10 +207,10 @@ def public_names(scopes):
 
 def check_tree(root):
     """All rules: file, line and message of each breach."""
-    names, is_repository = files_of(root)
+    names = files_of(root)
     if not any(name.startswith("src/") for name in names):
         yield "src", 1, "no sources found"
-    for name in sorted({name.split("/")[0] for name in names} - TOP_LEVEL if is_repository else ()):
+    for name in sorted({name.split("/")[0] for name in names} - TOP_LEVEL):
         yield name, 1, "this file or folder does not belong at the top level"
     for name in names:
         suffix = Path(name).suffix
@@ -240,15 +224,12 @@ def check_tree(root):
 
 
 def files_of(root):
-    """Names of the tracked files that exist, and whether git says so; in an archive all of the folders with sources."""
-    root = Path(root)
-    if (root / ".git").exists():
-        listed = subprocess.run(["git", "-C", root, "ls-files", "-z"], capture_output=True, text=True, check=True)
-        names = [name for name in listed.stdout.split("\0") if (root / name).is_file()]
-    else:
-        names = [str(path.relative_to(root)) for path in root.rglob("*")
-                 if path.is_file() and path.relative_to(root).parts[0] in FOLDERS]
-    return sorted(names), (root / ".git").exists()
+    """Names of the tracked files that exist; in an archive all of the folders with sources."""
+    listed = subprocess.run(["git", "-C", root, "ls-files"], capture_output=True, text=True, check=False)
+    if (Path(root) / ".git").exists():
+        return [name for name in sorted(listed.stdout.splitlines()) if (Path(root) / name).is_file()]
+    return sorted(str(path.relative_to(root)) for folder in FOLDERS for path in (Path(root) / folder).rglob("*")
+                  if path.is_file())
 
 
 def main():

@@ -27,7 +27,7 @@ def main():
     if not command.exists():
         print(f"{command} is missing; ./polydem test installs it")
         return 1 if (root / ".venv").exists() else SKIPPED
-    names = [name for name in files_of(root)[0] if name.endswith(suffix or "")]
+    names = [name for name in files_of(root) if name.endswith(suffix or "")]
     if suffix is None:
         names = [name for name in names if (root / name).read_bytes()[:100].split(b"\n")[0].endswith((b"bash", b"/sh"))]
     if not names:
