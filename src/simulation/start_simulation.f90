@@ -69,7 +69,8 @@ contains
       call enter_cell(self, error)
       if (allocated(error)) return
       call prepare_stages(self)
-      call new_traffic(self%settings, self%traffic)
+      call new_traffic(self%settings, self%traffic, error)
+      if (allocated(error)) return
       call new_integrator(settings%integrate, self%integrator)
       call choose_all_fields(self)
       if (allocated(self%loads)) call prepare_loads(self)
