@@ -21,7 +21,7 @@ module polydem_force_sums
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
-   !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]; number
+   !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]
    integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10, &
       n_terms = 10
    !> Number of bodies in a group for late terms

@@ -2,12 +2,13 @@
 module polydem_bed
    use polydem_arrange, only: loose_spacing
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: draw_sizes, settled_area
+   use polydem_grains, only: settled_area
    use polydem_kinds, only: wp
    use polydem_lattice, only: lattice_height
    use polydem_parts, only: parts_t
    use polydem_recipe, only: recipe_grains
    use polydem_settings, only: grains_settings_t, scene_settings_t
+   use polydem_sizes, only: draw_sizes
    implicit none
    private
    public :: make_bed

@@ -11,6 +11,7 @@ module polydem_source
    use polydem_random, only: new_random, random_t
    use polydem_serializer, only: serializer_t
    use polydem_settings, only: grains_settings_t, source_settings_t
+   use polydem_sizes, only: size_at
    implicit none
    private
    public :: source_t, candidate_t, new_source
@@ -87,13 +88,21 @@ contains
          group%diameter = s%diameter
          group%width = s%width
          group%height = s%height
+         group%elongation = s%elongation
          group%outline = s%outline
+         group%outline_corners = s%outline_corners
          group%angle = s%angle
          call draw_grains(group, random, 1_ip, grains)
          candidate%corners = grains%polygon(1_ip)
-         ! As the sizes of &grains: the number density is proportional to size**-3.
-         if (s%size_ratio > 1.0_wp) candidate%corners = candidate%corners/ &
-            sqrt(1.0_wp - random%uniform()*(1.0_wp - s%size_ratio**(-2)))
+         group%sizes = s%sizes
+         group%size_ratio = s%size_ratio
+         group%size_spread = s%size_spread
+         group%grading = s%grading
+         if (s%sizes /= 'octaves') then
+            candidate%corners = candidate%corners*size_at(group, random%uniform())
+         else if (s%size_ratio > 1.0_wp) then
+            candidate%corners = candidate%corners/sqrt(1.0_wp - random%uniform()*(1.0_wp - s%size_ratio**(-2)))
+         end if
       end associate
       candidate%radius = maxval(hypotenuse(candidate%corners(1, :), candidate%corners(2, :)))
    end subroutine draw_shape

@@ -3,14 +3,16 @@
 !> What happens depends on the step, the bodies and the state here alone, which a checkpoint contains, so a restart
 !> decides alike. The step of a departure is the first one without the body.
 module polydem_traffic
-   use polydem_errors, only: input_error, raise
+   use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_named_values, only: named_values_t
+   use polydem_outline_file, only: read_outlines
    use polydem_pair_parameters, only: density_of, material_number
    use polydem_serializer, only: serializer_t
    use polydem_series, only: series_t
    use polydem_settings, only: settings_t, sink_settings_t
    use polydem_source, only: new_source, source_t
+   use polydem_source_locations, only: place_of
    implicit none
    private
    public :: traffic_t, sink_t, departure_t, new_traffic, is_due, number_of_values
@@ -62,9 +64,11 @@ module polydem_traffic
 contains
 
    !> Start the sources and sinks of a run. Nothing is allocated if there are none.
-   subroutine new_traffic(settings, traffic)
+   subroutine new_traffic(settings, traffic, error)
       type(settings_t), intent(in) :: settings
       type(traffic_t), allocatable, intent(out) :: traffic
+      !> Names the source whose outlines cannot be read
+      type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k, seed
 
       if (size(settings%source) + size(settings%sink) == 0) return
@@ -77,6 +81,11 @@ contains
             seed = given%seed
             if (seed == 0_ip) seed = modulo(settings%scene%seed + 1001_ip*k, huge(1_ip))
             call new_source(given, seed, traffic%sources(k))
+            if (given%outlines /= '') call read_outlines(given%outlines, traffic%sources(k)%settings%outline, &
+                                                         traffic%sources(k)%settings%outline_corners, error)
+            if (allocated(error)) error%message = place_of(settings, 'source.'//given%name, 'outlines')// &
+               ': &source '//given%name//': outlines: '//error%message
+            if (allocated(error)) return
             traffic%sources(k)%stage = stage_number(settings, given%stage)
             traffic%sources(k)%material = material_number(settings, given%material)
             if (given%material == '') traffic%sources(k)%material = material_number(settings, settings%scene%material)

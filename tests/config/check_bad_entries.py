@@ -56,11 +56,13 @@ PARTS = {
     "region": {"box": {"low": "0, 0", "high": "0.2, 0.2"}, "disc": {"radius": "0.1"}, "at": {"at": "0.1, 0.1"},
                "polygon": {"vertices": "0, 0, 0.2, 0, 0.2, 0.2, 0, 0.2"}, "inside": {"wall": f"'{NAME}'"}},
     "arrangement": {"loose": {}, "spread": {}, "row": {}, "random": {}, "single": {"region": "at"},
-                    "column": {"region": "at", "shape": "rectangle"}, "packing": {"packing": "'none'"}},
-    "shape": {"ellipse": {}, "regular": {"diameter": "8e-3, 9e-3"}, "rectangle": {"width": "9e-3", "height": "4e-3"},
-              "cross": {"width": "9e-3", "arm": "3e-3"},
+                    "column": {"region": "at", "shape": "rectangle"}, "packing": {"packing": "'none'"},
+                    "voronoi": {"gap": "1e-4"}},
+    "shape": {"ellipse": {}, "regular": {"diameter": "8e-3, 9e-3"}, "random": {"diameter": "8e-3, 9e-3"},
+              "rectangle": {"width": "9e-3", "height": "4e-3"}, "cross": {"width": "9e-3", "arm": "3e-3"},
               "outline": {"outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3"}},
-    "sizes": {"uniform": {}, "octaves": {"size_ratio": "2"}}, "momentum": {"random": {}, "zero": {}},
+    "sizes": {"uniform": {}, "octaves": {"size_ratio": "2"}, "log_normal": {"size_spread": "1.2"},
+              "grading": {"grading": "1, 0, 2, 1"}}, "momentum": {"random": {}, "zero": {}},
 }
 #: Required entries of groups that need a scene of parts
 REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x"}, "stage": {},
@@ -161,6 +163,7 @@ def with_required(row):
             entries.update({"component": "xx"} if until == "stress" else {})
         if row.group == "source":
             entries.update(PARTS["shape"][entries.setdefault("shape", "ellipse")])
+            entries.update(PARTS["sizes"][entries.setdefault("sizes", "octaves")])
         if entries.get("area") == "rectangle":
             entries.update({"low": "0, 0", "high": "1, 1"})
         if row.group == "sample" and word == "walls":

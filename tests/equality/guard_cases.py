@@ -77,7 +77,7 @@ PARTS = (f"grains.{NAME}.", f"wall.{NAME}.")
 #: Entries of sources and sinks
 TRAFFIC = tuple(f"{group}.{NAME}.{key}" for group, keys in {
     "source": "low high rate count interval stage velocity corners short_axis long_axis diameter width height outline "
-              "angle size_ratio material density seed",
+              "outline_corners outlines elongation size_spread grading angle size_ratio material density seed",
     "sink": "low high interval stage"}.items() for key in keys.split())
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
 VARIED = {
@@ -108,6 +108,9 @@ VARIED = {
     "grains.one.short_axis": "7e-3", "grains.one.long_axis": "9e-3, 12e-3", "grains.one.diameter": "8e-3, 9e-3",
     "grains.one.width": "6e-3", "grains.one.height": "4e-3", "grains.one.arm": "2e-3",
     "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
+    "grains.one.outline_corners": "3, 4", "grains.one.outlines": None, "grains.one.elongation": "2",
+    "grains.one.lloyd_steps": "3", "grains.one.gap": "2e-4",
+    "grains.one.size_spread": "1.3", "grains.one.grading": "1, 0, 1.5, 0.4, 2, 1",
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
@@ -141,6 +144,8 @@ VARIED = {
     "output.series_interval": "1e-3", "output.trace_steps": "20", "output.trace_start": "0.01",
     "checkpoint.steps": "50", "checkpoint.interval": "0.01", "checkpoint.elapsed": None,
 }
+#: A triangle and a square
+TWO_OUTLINES = "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3, -3e-3, -3e-3, 3e-3, -3e-3, 3e-3, 3e-3, -3e-3, 3e-3"
 #: What an entry needs beside it to have an effect
 BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"},
           **{name: {"material.one.density": "1000", "material.one.stiffness": "3e5"} for name in (
@@ -156,6 +161,9 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           "contact_pair.one.damping_coefficient": {
               "material.one.density": "1000", "scene.material": "one", "forces.damping_coefficient": "0.1",
               "contact_pair.one.materials": VARIED["contact_pair.one.materials"]},
+          "grains.one.outline_corners": {"grains.one.outline": TWO_OUTLINES},
+          "grains.one.outline_choice": {"grains.one.outline": TWO_OUTLINES, "grains.one.outline_corners": "3, 4"},
+          "grains.one.lloyd_steps": {"grains.one.gap": "1e-4"},
           "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
           **{f"sample.{key}": {"output.series_interval": "1e-3"} for key in ("area", "low", "high")},
           "forces.shake": {"forces.shake_frequency": "40"}, "forces.shake_frequency": {"forces.shake": "5, 10"},
@@ -170,11 +178,13 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
              "cell.shear_ramp": "as cell.shear_rate", "grains.one.packing": "as scene.packing",
-             "grains.one.number": "blocks of scene.name = stack",
+             "grains.one.number": "blocks of scene.name = stack", "grains.one.outlines": "test_shapes.pf",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
-UNTRIED = {("source.one.shape", "regular"), ("source.one.shape", "rectangle"), ("source.one.shape", "outline"),
+UNTRIED = {*(("source.one.shape", shape) for shape in ("regular", "random", "rectangle", "outline")),
+           *(("source.one.sizes", sizes) for sizes in ("log_normal", "grading")),
+           ("grains.one.shape", "outline"), ("grains.one.arrangement", "voronoi"),
            ("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
            ("stage.one.until", "strain"), ("stage.one.until", "stress"), ("sample.area", "walls"),
            ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"),

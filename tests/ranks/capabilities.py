@@ -58,6 +58,10 @@ CAPABILITIES = {
                "&contact_pair name = 'both' materials = 'hard', 'soft' friction_coefficient = 0.4 restitution = 0.6 /\n"
                "&scene material = 'hard' /\n",
         wall="material = 'soft'", upper="material = 'soft'"),
+    "random_shapes": Capability(lower="shape = 'random' corners = 3, 9 diameter = 5e-3, 7e-3 elongation = 1.5"
+                                      " sizes = 'log_normal' size_spread = 1.1"),
+    "blocks": Capability(groups="&grains name = 'blocks' region = 'box' low = 0.022, -0.005 high = 0.048, 0.005"
+                                " arrangement = 'voronoi' number = 6 gap = 5e-4 lloyd_steps = 2 speed = 1 /\n"),
     "cohesion": Capability(forces="cohesion = 200"),
     "drag": Capability(forces="drag = 4"),
     "local_damping": Capability(forces="local_damping = 0.2"),

@@ -60,6 +60,8 @@ contains
             'names the wall that yields; the width is the distance of two other walls, across the direction '// &
             'of the load', error)
       end if
+      if (load%mass > 0.0_wp .and. load%mass < 1.0e-12_wp) call blame(instance, 'mass', &
+         'must be 0, or at least 1e-12', error)
       if (load%end > 0.0_wp .and. load%end <= load%start) call blame(instance, 'end', 'must be behind ''start''', &
          error, 'start')
    end subroutine check_width

@@ -11,7 +11,7 @@ module polydem_check_parts
    use polydem_strings, only: quoted, split_words, suggestion, to_text
    implicit none
    private
-   public :: check_parts
+   public :: check_parts, check_outlines, check_grading
 
    !> Upper limit of the number of corners of the grains of a group, of which half the range of integers can count
    integer(lp), parameter :: corner_limit = 2_lp**30
@@ -95,7 +95,12 @@ contains
       type(instance_t), intent(in) :: instance
       type(error_t), allocatable, intent(inout) :: error
 
-      if (group%region /= 'at') then
+      if (group%arrangement == 'voronoi') then
+         if (group%number == 0_ip) call blame(instance, 'number', 'is 0; give the number of blocks, for example '// &
+            'number = 200', error)
+         if (group%gap > 0.0_wp .eqv. group%solid_fraction > 0.0_wp) call blame(instance, 'solid_fraction', &
+            'or ''gap'' is needed, and only one of them; for example solid_fraction = 0.95', error, 'gap')
+      else if (group%region /= 'at') then
          if (group%number == 0_ip .and. .not. group%solid_fraction > 0.0_wp) call blame(instance, 'number', &
             'is 0; give it, or give ''solid_fraction'', for example number = 50', error)
          if (group%number > 0_ip .and. group%solid_fraction > 0.0_wp) call blame(instance, 'solid_fraction', &
@@ -131,12 +136,60 @@ contains
          'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
       if (group%moving_grains > group%number .and. group%number > 0_ip) call blame(instance, 'moving_grains', &
          'must not exceed ''number''', error, 'number')
+      call check_outlines(group%shape, group%outline, group%outline_corners, group%outlines, instance, error)
+      call check_grading(group%sizes, group%grading, instance, error)
       if (group%number*max(4_lp, int(group%corners(2), lp), size(group%outline, kind=lp)/2_lp) > corner_limit) &
          call blame(instance, 'number', 'must not exceed 2^30 divided by the number of corners of a grain; give '// &
          'less, for example number = 1000000', error, 'corners')
-      if (group%overlap .and. group%size_ratio > 1.0_wp) call blame(instance, 'overlap', &
-         'cannot be combined with sizes = ''octaves''', error, 'sizes')
+      if (group%overlap .and. group%sizes /= 'uniform' .and. group%sizes /= '') call blame(instance, 'overlap', &
+         'cannot be combined with sizes = '//quoted(group%sizes), error, 'sizes')
    end subroutine check_group
+
+   !> Check that there are outlines, and that their corners are as many as their numbers say.
+   pure subroutine check_outlines(shape, outline, corners, outlines, instance, error)
+      !> Shape of the grains
+      character(len=*), intent(in) :: shape
+      !> Corners of the outlines [m]
+      real(wp), intent(in) :: outline(:)
+      !> Number of corners of each of them
+      integer(ip), intent(in) :: corners(:)
+      !> Path of a file of outlines
+      character(len=*), intent(in) :: outlines
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (shape /= 'outline') return
+      if (size(outline) == 0 .and. outlines == '') call blame(instance, 'outline', 'is required with shape = '// &
+         '''outline'', unless ''outlines'' names a file; for example outline = 0, 0, 0.01, 0, 0.01, 0.01', error)
+      if (size(outline) + size(corners) > 0 .and. outlines /= '') call blame(instance, 'outlines', 'cannot be '// &
+         'combined with ''outline'' and ''outline_corners''; give only the file or the corners', error)
+      if (size(corners) > 0 .and. 2_lp*sum(int(corners, lp)) /= size(outline) .and. outlines == '') call blame( &
+         instance, 'outline_corners', 'has '//to_text(sum(int(corners, lp)))//' corners in all, but ''outline'' '// &
+         'has '//to_text(size(outline, kind=lp)/2_lp)//'; give the number of corners of each outline', error, 'outline')
+   end subroutine check_outlines
+
+   !> Check a sieve curve.
+   pure subroutine check_grading(sizes, grading, instance, error)
+      !> Distribution of sizes
+      character(len=*), intent(in) :: sizes
+      !> Pairs of size factor and fraction
+      real(wp), intent(in) :: grading(:)
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), parameter :: example = '; for example grading = 1, 0, 2, 0.4, 4, 1'
+      integer :: n
+
+      if (sizes /= 'grading') return
+      n = size(grading)
+      if (n < 4 .or. modulo(n, 2) == 1) then
+         call blame(instance, 'grading', 'needs pairs of size and fraction, at least two'//example, error)
+      else if (.not. grading(1) > 0.0_wp .or. any(.not. grading(3::2) > grading(:n - 2:2))) then
+         call blame(instance, 'grading', 'must have sizes above 0 in ascending order'//example, error)
+      else if (any(.not. grading(4::2) >= grading(2:n - 2:2)) .or. abs(grading(2)) > 0.0_wp .or. &
+               abs(grading(n) - 1.0_wp) > 0.0_wp) then
+         call blame(instance, 'grading', 'must have fractions that do not fall, from 0 to 1'//example, error)
+      end if
+   end subroutine check_grading
 
    !> Check a wall that consists of bodies of a file: there is a file, a motion moves the wall, a load acts on it, it
    !> vanishes, bounds the sample or the series has it, and no other wall has its bodies.

@@ -1,6 +1,7 @@
 !> Checks of the groups &source and &sink: entries that depend on each other.
 module polydem_check_sources
    use polydem_blame_entry, only: blame
+   use polydem_check_parts, only: check_grading, check_outlines
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: wp
@@ -59,6 +60,11 @@ contains
       if (source%long_axis(1) > source%long_axis(2)) call blame(instance, 'long_axis', order, error)
       if (source%diameter(1) > source%diameter(2)) call blame(instance, 'diameter', order, error)
       if (source%angle(1) > source%angle(2)) call blame(instance, 'angle', order, error)
+      call check_outlines(source%shape, source%outline, source%outline_corners, source%outlines, instance, error)
+      call check_grading(source%sizes, source%grading, instance, error)
+      if (source%shape == 'outline' .and. source%outlines == '' .and. &
+          (size(source%outline) < 6 .or. modulo(size(source%outline), 2) == 1)) call blame(instance, 'outline', &
+         'needs x and y of at least three corners; for example 0, 0, 0.01, 0, 0.01, 0.01', error)
       if (source%shape == 'ellipse' .and. source%short_axis > source%long_axis(1)) call blame(instance, 'short_axis', &
          'must not exceed the first value of ''long_axis''', error, 'long_axis')
       if (source%shape == 'ellipse' .and. source%long_axis(2) > 1.0e6_wp*source%short_axis) call blame(instance, &

@@ -2,9 +2,10 @@
 !>
 !> Work is the integral of power over time, by the trapezoidal rule between the ends of steps. Its channels are the
 !> elastic normal forces, damping and friction (all contacts; usually negative), and moving walls with gravity that
-!> changes. Powers are those of the final velocities of a step. With predicted velocities each jump of a force would leave a residual. Force times
-!> final velocity is exactly the energy that velocity Verlet adds from the middle of a step to the middle of the next.
-!> With the potential energy of gravity, kinetic + potential - work is constant up to the error of integration.
+!> changes. Powers are those of the final velocities of a step. With predicted velocities each jump of a force would
+!> leave a residual. Force times final velocity is exactly the energy that velocity Verlet adds from the middle of a
+!> step to the middle of the next. With the potential energy of gravity, kinetic + potential - work is constant up to
+!> the error of integration.
 !> The area law has no potential energy: its elastic work does not return to zero when contacts open. The elastic work
 !> of the conservative law is not a sum over steps. It is the elastic energy at the start minus the present one.
 !>

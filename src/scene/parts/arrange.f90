@@ -12,6 +12,7 @@ module polydem_arrange
    use polydem_polygon, only: mass_properties
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: grains_settings_t
+   use polydem_sizes, only: sizes_differ
    implicit none
    private
    public :: region_t, arrange_grains, area_of, loose_spacing, total_area
@@ -61,7 +62,7 @@ contains
       call draw_grains(group, random, n, grains)
       if (group%arrangement == 'random') then
          call place_at_random(region, seed, grains, centres, n_found)
-      else if (group%size_ratio > 1.0_wp) then
+      else if (sizes_differ(group)) then
          call fit_cells(region%corners, loose_spacing_ratio*grains%length, random, centres, play)
          n_found = merge(n, 0_ip, play > 0.0_wp)
       else

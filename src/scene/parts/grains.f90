@@ -2,8 +2,8 @@
 !>
 !> The usual grains are irregular convex polygons inscribed in ellipses. All ellipses have the same short axis. The long
 !> axis, the number of corners, the positions of the corners and the orientation are random. A polygon inscribed in an
-!> ellipse is convex for any positions of its corners. Other groups have regular polygons, rectangles or a given
-!> outline. If grains differ in size, all lengths are multiplied by the size factor of the grain.
+!> ellipse is convex for any positions of its corners. Other groups have regular or random polygons, rectangles or given
+!> outlines. If grains differ in size, all lengths are multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
    use polydem_elementary, only: hypotenuse, sine_and_cosine
@@ -12,11 +12,13 @@ module polydem_grains
    use polydem_polygon, only: mass_properties
    use polydem_polygon_list, only: polygon_list_t
    use polydem_random, only: random_t
+   use polydem_random_polygon, only: draw_random_polygon
    use polydem_settings, only: grains_settings_t
+   use polydem_sizes, only: draw_sizes, sizes_of
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: grain_t, grains_t, draw_grains, draw_sizes, append_grains, settled_area, greatest_length
+   public :: grain_t, grains_t, draw_grains, append_grains, settled_area, greatest_length, most_corners_of
 
    !> Total area of the ellipses around the grains of a settled bed over the area of the bed
    real(wp), parameter :: settled_fraction = 0.895_wp
@@ -81,12 +83,18 @@ contains
       real(wp) :: length, area, centroid(2), second_moment
       integer(ip) :: k
 
-      call grains%start(n, max(4_ip, group%corners(2), size(group%outline, kind=ip)/2_ip))
-      sizes = draw_sizes(group%size_ratio, n)
+      call grains%start(n, int(most_corners_of(group), ip))
+      sizes = sizes_of(group, n)
       do k = 1_ip, n
          select case (group%shape)
          case ('regular')
             call draw_regular(group, sizes(k), random, corners, length)
+         case ('random')
+            length = sizes(k)*random%between(group%diameter(1), group%diameter(2))
+            call draw_random_polygon(random, random%whole(group%corners(1), group%corners(2)), length, &
+                                     length/group%elongation, corners)
+            call turn_at_random(group, random, corners)
+            length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))
          case ('rectangle')
             corners = sizes(k)*rectangle(-0.5_wp*group%width, 0.5_wp*group%width, -0.5_wp*group%height, &
                                          0.5_wp*group%height)
@@ -97,7 +105,7 @@ contains
             length = sizes(k)*greatest_length(group)
             call turn_at_random(group, random, corners)
          case ('outline')
-            corners = sizes(k)*as_corners(group%outline)
+            corners = sizes(k)*chosen_outline(group, random, k)
             length = sizes(k)*greatest_length(group)
             call turn_at_random(group, random, corners)
          case default
@@ -117,6 +125,8 @@ contains
       select case (group%shape)
       case ('regular')
          greatest_length = group%diameter(2)
+      case ('random')
+         greatest_length = hypotenuse(group%diameter(2), group%diameter(2)/group%elongation)
       case ('rectangle')
          greatest_length = hypotenuse(group%width, group%height)
       case ('cross')
@@ -130,28 +140,38 @@ contains
       end select
    end function greatest_length
 
-   !> Size factors between 1 and the size ratio, in descending order, without randomness.
-   !>
-   !> The number density of the sizes is proportional to size**-3, so each octave of sizes covers the same area. The
-   !> fraction of grains smaller than s is (1 - s**-2)/(1 - ratio**-2). Grain k of n has the size at which this fraction
-   !> is (n - k)/(n - 1). The list contains both extremes.
-   pure function draw_sizes(ratio, n) result(sizes)
-      !> Largest size factor, at least 1
-      real(wp), intent(in) :: ratio
-      !> Number of grains
-      integer(ip), intent(in) :: n
-      real(wp) :: sizes(n)
-      real(wp) :: share
-      integer(ip) :: k
+   !> Greatest number of corners of a grain
+   pure integer(lp) function most_corners_of(group)
+      !> Shape of the grains
+      type(grains_settings_t), intent(in) :: group
 
-      sizes = 1.0_wp
-      if (ratio <= 1.0_wp) return
-      sizes(1) = ratio
-      do k = 2_ip, n - 1_ip
-         share = real(n - k, wp)/real(n - 1_ip, wp)
-         sizes(k) = 1.0_wp/sqrt(1.0_wp - share*(1.0_wp - ratio**(-2)))
-      end do
-   end function draw_sizes
+      most_corners_of = max(4_lp, int(group%corners(2), lp))
+      if (size(group%outline_corners) > 0) then
+         most_corners_of = max(most_corners_of, int(maxval(group%outline_corners), lp))
+      else
+         most_corners_of = max(most_corners_of, size(group%outline, kind=lp)/2_lp)
+      end if
+   end function most_corners_of
+
+   !> The outline of a grain: the only one, a random one, or the next one
+   function chosen_outline(group, random, k) result(corners)
+      type(grains_settings_t), intent(in) :: group
+      type(random_t), intent(inout) :: random
+      !> Number of the grain
+      integer(ip), intent(in) :: k
+      real(wp), allocatable :: corners(:, :)
+      integer(ip) :: choice, first, n
+
+      n = size(group%outline_corners, kind=ip)
+      if (n == 0_ip) then
+         corners = as_corners(group%outline)
+         return
+      end if
+      choice = 1_ip + modulo(k - 1_ip, n)
+      if (group%outline_choice == 'random') choice = random%whole(1_ip, n)
+      first = 2_ip*sum(group%outline_corners(:choice - 1_ip))
+      corners = as_corners(group%outline(first + 1_ip:first + 2_ip*group%outline_corners(choice)))
+   end function chosen_outline
 
    !> Append grains to the list of bodies in the given order or, if the order is 'descending', from right to left.
    !>

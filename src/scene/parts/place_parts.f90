@@ -5,22 +5,24 @@ module polydem_place_parts
    use polydem_column, only: pile_up
    use polydem_errors, only: error_t, input_error, raise
    use polydem_fit, only: explain
-   use polydem_grains, only: append_grains, draw_grains, grains_t, greatest_length
+   use polydem_grains, only: append_grains, draw_grains, grains_t, greatest_length, most_corners_of
    use polydem_kinds, only: ip, lp, wp
+   use polydem_outline_file, only: find_outlines
    use polydem_outlines, only: are_apart
    use polydem_packing, only: rotate_with_walls
    use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: parts_t
-   use polydem_polygon, only: clean_polygon
    use polydem_polygon_list, only: polygon_list_t
    use polydem_random, only: new_random, random_t
    use polydem_regions, only: check_walls, draw_region, rounding_of
    use polydem_settings, only: grains_settings_t, settings_t
+   use polydem_sizes, only: sizes_differ
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_start_velocities, only: choose_moving_grains, draw_spins, draw_velocities, remove_momentum, set_speed
-   use polydem_strings, only: to_text
+   use polydem_strings, only: quoted, to_text
+   use polydem_voronoi, only: cut_blocks
    use polydem_wall_bodies, only: wall_bodies_t
-   use polydem_wall_outlines, only: check_corners, outline_wall, problem_t
+   use polydem_wall_outlines, only: outline_wall, problem_t
    implicit none
    private
    public :: list_parts
@@ -29,6 +31,8 @@ module polydem_place_parts
    real(wp), parameter :: longest_region = 1.0e5_wp
    !> Greatest number of corners of the grains of a group
    integer(lp), parameter :: most_corners = 2_lp**30
+   !> Arrangements that fill an empty region with grains of their own
+   character(len=*), parameter :: fills(2) = [character(len=7) :: 'packing', 'voronoi']
 
 contains
 
@@ -161,7 +165,8 @@ contains
       if (.not. density > 0.0_wp) density = density_of(settings, material)
       seed = group%seed
       if (seed == 0_ip) seed = int(modulo(int(settings%scene%seed, lp) + number - 1_lp, int(huge(seed), lp)), ip)
-      call check_group(group, problem)
+      if (group%shape == 'outline') call find_outlines(settings, group, problem, error)
+      if (allocated(error)) return
       if (allocated(problem%text)) return
       random = new_random(seed)
       if (group%arrangement == 'column' .or. group%arrangement == 'single') then
@@ -170,7 +175,7 @@ contains
          call prepare_region(parts, walls, wall_of, placed, seed, group, region, problem)
          if (allocated(problem%text)) return
          allocate (centres(2, group%number))
-         call arrange_grains(group, region, seed, random, grains, centres, n_found, error)
+         call fill_region(group, region, seed, random, grains, centres, n_found, problem, error)
          if (allocated(error) .and. parts%recipe == '') error%message = &
             place_of(settings, 'grains.'//group%name, 'packing')//': &grains '//group%name//': '//error%message
          if (allocated(error)) return
@@ -192,20 +197,26 @@ contains
       end do
    end subroutine list_group
 
-   !> Check entries that belong together.
-   subroutine check_group(group, problem)
+   !> Fill a region with blocks, or arrange grains in it.
+   subroutine fill_region(group, region, seed, random, grains, centres, n_found, problem, error)
       type(grains_settings_t), intent(in) :: group
+      type(region_t), intent(in) :: region
+      integer(ip), intent(in) :: seed
+      type(random_t), intent(inout) :: random
+      type(grains_t), intent(out) :: grains
+      real(wp), intent(out) :: centres(:, :)
+      !> Number of grains that fit
+      integer(ip), intent(out) :: n_found
       type(problem_t), intent(inout) :: problem
-      real(wp), allocatable :: cleaned(:, :)
+      type(error_t), allocatable, intent(inout) :: error
 
-      if (group%shape == 'outline' .and. group%arrangement /= 'packing') then
-         call check_corners(group%outline, 3, 'outline', problem)
-         if (allocated(problem%text)) return
-         call clean_polygon(reshape(group%outline, [2, size(group%outline)/2]), cleaned, problem%text)
-         if (allocated(problem%text)) problem%text = problem%text//'; give convex grains, for example '// &
-            '0, 0, 0.01, 0, 0.01, 0.01'
+      n_found = group%number
+      if (group%arrangement == 'voronoi') then
+         call cut_blocks(region%corners, area_of(region), group, random, grains, centres, problem)
+      else
+         call arrange_grains(group, region, seed, random, grains, centres, n_found, error)
       end if
-   end subroutine check_group
+   end subroutine fill_region
 
    !> Place a single body, or a column of bodies, where the group says.
    subroutine place_bodies(parts, group, density, settings, walls, wall_of, random, grains, centres, problem)
@@ -282,14 +293,18 @@ contains
             call region%obstacles%add(corners)
          end associate
       end do
-      if (group%arrangement /= 'packing' .and. .not. group%size_ratio > 1.0_wp) return
+      if (all(group%arrangement /= fills) .and. .not. sizes_differ(group)) return
       if (group%arrangement == 'random') return
       problem%key = 'region'
       if (region%obstacles%polygons%n > 0_ip) then
-         problem%text = 'contains other bodies, but '//trim(merge('arrangement = ''packing'' needs', &
-            'sizes = ''octaves'' needs      ', group%arrangement == 'packing'))//' an empty one; choose another '// &
-            'region, or put the group before the others'
-      else if (group%arrangement /= 'packing' .and. .not. region%is_box) then
+         problem%text = 'contains other bodies, but '
+         if (any(group%arrangement == fills)) then
+            problem%text = problem%text//'arrangement = '//quoted(group%arrangement)
+         else
+            problem%text = problem%text//'sizes = '//quoted(group%sizes)
+         end if
+         problem%text = problem%text//' needs an empty one; choose another region, or put the group before the others'
+      else if (all(group%arrangement /= fills) .and. .not. region%is_box) then
          problem%text = 'must be ''box'' for grains of many sizes in rows; or write arrangement = ''random'''
       end if
    end subroutine add_obstacles
@@ -313,7 +328,7 @@ contains
          call draw_grains(group, random, group%number, grains)
          former = group%number
          group%number = int(min(1.0e9_wp, max(1.0_wp, anint(real(former, wp)*(wanted/total_area(grains%area))))), ip)
-         if (group%number == former .or. group%number*corners_of(group) > most_corners) exit
+         if (group%number == former .or. group%number*most_corners_of(group) > most_corners) exit
       end do
    end subroutine choose_number
 
@@ -324,26 +339,19 @@ contains
       type(problem_t), intent(inout) :: problem
       real(wp) :: extent
 
-      if (group%arrangement == 'packing') return
+      if (any(group%arrangement == fills)) return
       extent = maxval(maxval(region%corners, 2) - minval(region%corners, 2))
       problem%key = 'region'
       if (extent > longest_region*greatest_length(group)) problem%text = 'is '//to_text(extent, 3)// &
          ' m long, more than 1e5 times the greatest length of a grain, '//to_text(greatest_length(group), 3)// &
          ' m; give larger grains, or a region of at most '// &
          to_text(0.99_wp*longest_region*greatest_length(group), 2)//' m'
-      if (group%number*corners_of(group) <= most_corners) return
+      if (group%number*most_corners_of(group) <= most_corners) return
       problem%key = 'solid_fraction'
       problem%text = 'asks for '//to_text(group%number)//' grains, but at most '// &
-         to_text(most_corners/corners_of(group))//' with so many corners are possible; lower it to '// &
-         to_text(0.9_wp*group%solid_fraction*real(most_corners/corners_of(group), wp)/real(group%number, wp), 2)
+         to_text(most_corners/most_corners_of(group))//' with so many corners are possible; lower it to '// &
+         to_text(0.9_wp*group%solid_fraction*real(most_corners/most_corners_of(group), wp)/real(group%number, wp), 2)
    end subroutine check_size
-
-   !> Greatest number of corners of a grain
-   pure integer(lp) function corners_of(group)
-      type(grains_settings_t), intent(in) :: group
-
-      corners_of = max(4_lp, int(group%corners(2), lp), size(group%outline, kind=lp)/2_lp)
-   end function corners_of
 
    !> Find the velocities and angular velocities of the grains of a group.
    subroutine find_velocities(group, areas, random, velocities, spins)

@@ -72,7 +72,8 @@ contains
       call enter_cell(self, error)
       if (allocated(error)) return
       call prepare_stages(self)
-      call new_traffic(self%settings, self%traffic)
+      call new_traffic(self%settings, self%traffic, error)
+      if (allocated(error)) return
       call new_integrator(settings%integrate, self%integrator)
       call choose_finder(self%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, self%bodies%isa)
       call choose_all_fields(self)
