@@ -30,7 +30,7 @@ module polydem_simulation
    use polydem_thread_results, only: loop_results_t
    implicit none
    private
-   public :: simulation_t, former_direction, time_of, compute_balance
+   public :: simulation_t, relaxation_t, former_direction, time_of, compute_balance
    public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: contacts, pairs that began, pairs that ended, contacts without direction

@@ -78,7 +78,8 @@ contains
          call check_number(self, duration, steps, error)
          if (allocated(error)) return
          self%n_steps = nint(steps, lp)
-         if (self%stages%number > 0_ip) call find_last_steps(self)
+         if (self%stages%number > 0_ip) call find_last_steps(self%settings%stage, self%dt, self%stages, &
+                                                                 self%n_steps)
       end associate
       call check_rate(self, error)
    end subroutine choose_step

@@ -89,7 +89,7 @@ contains
       if (.not. allocated(error)) call check_constraint(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call limit_displacement(self)
+      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion_check)
       call self%integrator%start(self%bodies)
       if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
