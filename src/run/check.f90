@@ -8,7 +8,7 @@ module polydem_check
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
    use polydem_monitor, only: check_step, new_monitor, monitor_t
-   use polydem_run_output, only: count_frames
+   use polydem_output_intervals, only: count_frames
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
