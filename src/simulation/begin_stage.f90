@@ -8,7 +8,7 @@ module polydem_begin_stage
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_stage
    use polydem_run_stages, only: run_stages_t
-   use polydem_settings, only: forces_settings_t, stage_settings_t
+   use polydem_settings, only: forces_settings_t, settings_t, stage_settings_t
    use polydem_simulation, only: simulation_t
    use polydem_sort, only: place_in
    use polydem_source_locations, only: place_of
@@ -20,16 +20,17 @@ module polydem_begin_stage
 contains
 
    !> Take the parameters of the first stage, before the simulation starts.
-   subroutine prepare_stages(self)
-      !> The simulation with its settings
-      type(simulation_t), intent(inout) :: self
+   subroutine prepare_stages(settings, stages)
+      !> Settings; gravity and drag of &forces become those of the first stage
+      type(settings_t), intent(inout) :: settings
+      type(run_stages_t), intent(inout) :: stages
 
-      if (size(self%settings%stage) == 0) return
-      self%stages%gravity = self%settings%forces%gravity
-      self%stages%drag = self%settings%forces%drag
-      self%stages%number = 1_ip
-      self%stages%first = [0_lp]
-      call set_parameters(self%settings%stage(1), self%stages, self%settings%forces)
+      if (size(settings%stage) == 0) return
+      stages%gravity = settings%forces%gravity
+      stages%drag = settings%forces%drag
+      stages%number = 1_ip
+      stages%first = [0_lp]
+      call set_parameters(settings%stage(1), stages, settings%forces)
    end subroutine prepare_stages
 
    !> Take the parameters of a stage.

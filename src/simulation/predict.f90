@@ -10,11 +10,12 @@ module polydem_predict
    use polydem_errors, only: error_t
    use polydem_motion_check, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
+   use polydem_named_walls, only: named_walls_t
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part
    use polydem_timers, only: block_clock_t
-   use polydem_wall, only: move_wall
-   use polydem_wall_load, only: carry_walls, correct_loads, predict_loads
+   use polydem_wall, only: move_wall, wall_t
+   use polydem_wall_load, only: carry_walls, correct_loads, predict_loads, wall_load_t
    implicit none
    private
    public :: predict_border, predict_bodies, move_walls, yield_walls
@@ -38,11 +39,11 @@ contains
       call self%flight%begin_step(self%neighbours%pairs, self%bodies%n)
       call predict_and_bound(self, good, has_left, clock)
       if (allocated(self%loads)) call predict_loads(self%dt, self%loads)
-      call move_walls(self, time_of(self))
-      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%motion_check%moving, kind=ip)
-         good = good .and. have_valid_poses(self%bodies, self%motion_check%moving(k), self%motion_check%moving(k))
+      call move_walls(self%walls, self%named, time_of(self), self%bodies, self%loads)
+      do k = size(self%bodies%free, kind=ip) + 1_ip, self%n_moving
+         good = good .and. have_valid_poses(self%bodies, self%moving(k), self%moving(k))
       end do
-      if (.not. good) call check_poses(self%motion_check, self%bodies, self%step, error)
+      if (.not. good) call check_poses(self%bodies, self%moving(:self%n_moving), self%step, error)
    end subroutine predict_bodies
 
    !> Predict the bodies of the border, which other ranks wait for. The message does not need their vertices and boxes.
@@ -189,17 +190,23 @@ contains
    end subroutine bound_block
 
    !> Move the bodies with prescribed motion to their poses at a given time, and displace them by loads.
-   subroutine move_walls(self, time)
-      type(simulation_t), intent(inout) :: self
+   subroutine move_walls(walls, named, time, bodies, loads)
+      !> Fixed bodies with prescribed motions or loads
+      type(wall_t), intent(in) :: walls(:)
+      !> Walls by name
+      type(named_walls_t), intent(in) :: named
       !> Simulated time [s]
       real(wp), intent(in) :: time
+      type(bodies_t), intent(inout) :: bodies
+      !> Loads on named walls; absent or not allocated: none
+      type(wall_load_t), intent(in), optional :: loads(:)
       integer :: k
 
-      do k = 1, size(self%walls)
-         call move_wall(self%walls(k), time, self%bodies)
-         if (self%bodies%cell%is_periodic) call put_into_cell(self%bodies, self%walls(k)%slots)
+      do k = 1, size(walls)
+         call move_wall(walls(k), time, bodies)
+         if (bodies%cell%is_periodic) call put_into_cell(bodies, walls(k)%slots)
       end do
-      if (allocated(self%loads)) call carry_walls(self%loads, self%named, self%bodies)
+      if (present(loads)) call carry_walls(loads, named, bodies)
    end subroutine move_walls
 
    !> Find the velocities of the walls that yield to loads from the contacts. Their places do not change. Collective.
@@ -210,7 +217,7 @@ contains
       real(wp), intent(in) :: dt
 
       call correct_loads(self%loads, self%comm, dt, time_of(self), self%named, self%bodies, self%loop%walls)
-      call move_walls(self, time_of(self))
+      call move_walls(self%walls, self%named, time_of(self), self%bodies, self%loads)
    end subroutine yield_walls
 
 end module polydem_predict

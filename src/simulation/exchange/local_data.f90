@@ -17,7 +17,7 @@ module polydem_local_data
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: restart_neighbours
    use polydem_contact_flags, only: new_flag_limits
-   use polydem_settings, only: guards_settings_t, settings_t
+   use polydem_settings, only: guards_settings_t
    use polydem_simulation, only: simulation_t, former_direction
    use polydem_stable_step, only: stiffest_product
    use polydem_wall, only: wall_t
@@ -55,9 +55,9 @@ contains
                              allocated(self%body_forces%list) .or. self%bodies%cell%is_sheared .or. &
                              self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
       self%loop%incidence = incidence_t()
-      call list_moving(self%bodies, self%walls, self%moving)
-      call rebuild_guard(self%settings, self%bodies, self%moving(:size(self%moving) - count(self%bodies%in_halo)), &
-                         self%motion_check)
+      call list_moving(self%bodies, self%walls, self%moving, self%n_moving)
+      if (.not. allocated(self%motion_check%choice)) call new_motion_check( &
+         self%motion_check, self%settings%guards, self%bodies, shorter_step(self%settings%integrate))
       associate (choice => self%settings%boxes)
          call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error, &
             median_diameter, self%domain%margin)
@@ -97,19 +97,6 @@ contains
       call reserve_contacts(contacts, 0_ip)
    end subroutine fit_table
 
-   !> Rebuild the check of the motion for the present bodies. After the start only the list of bodies changes.
-   subroutine rebuild_guard(settings, bodies, moving, check)
-      type(settings_t), intent(in) :: settings
-      type(bodies_t), intent(in) :: bodies
-      !> Slots of the bodies that may move and that this rank moves
-      integer(ip), intent(in) :: moving(:)
-      type(motion_check_t), intent(inout) :: check
-
-      if (.not. allocated(check%moving)) &
-         call new_motion_check(check, settings%guards, bodies, moving, shorter_step(settings%integrate))
-      check%moving = moving
-   end subroutine rebuild_guard
-
    !> Allocate the columns of the contact history: those of the force law, at the places known to its parts, then those
    !> of the guards.
    subroutine allocate_history(law, settings, history)
@@ -126,11 +113,13 @@ contains
    end subroutine allocate_history
 
    !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.
-   subroutine list_moving(bodies, walls, moving)
+   subroutine list_moving(bodies, walls, moving, n_moving)
       type(bodies_t), intent(in) :: bodies
       !> Fixed bodies with prescribed motions or loads
       type(wall_t), intent(in) :: walls(:)
       integer(ip), allocatable, intent(out) :: moving(:)
+      !> Number of slots before the halo bodies
+      integer(ip), intent(out) :: n_moving
       integer :: k
       integer(ip) :: s
 
@@ -138,6 +127,7 @@ contains
       do k = 1, size(walls)
          moving = [moving, walls(k)%slots]
       end do
+      n_moving = size(moving, kind=ip)
       moving = [moving, pack([(s, s=1_ip, bodies%n)], bodies%in_halo)]
    end subroutine list_moving
 

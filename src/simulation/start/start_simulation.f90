@@ -59,7 +59,7 @@ contains
       self%settings = settings
       call enter_cell(self, error)
       if (allocated(error)) return
-      call prepare_stages(self)
+      call prepare_stages(self%settings, self%stages)
       call choose_methods(self, error)
       if (allocated(error)) return
       call draw_sample(self, sample, error)
@@ -79,7 +79,7 @@ contains
       if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
       call continue_stages(self, error)
-      call move_walls(self, 0.0_wp)
+      call move_walls(self%walls, self%named, 0.0_wp, self%bodies, self%loads)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
       if (.not. allocated(error)) call check_traffic(self, error)
       call redistribute(self, .false., error)
