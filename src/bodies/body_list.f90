@@ -67,10 +67,9 @@ module polydem_body_list
 
 contains
 
-   !> Append a body. The default `mass` of a free body is density times area. Its default `inertia` is that of its mass
-   !> spread evenly over the polygon. The default mass and moment of inertia of a fixed body are infinite.
-   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia, material, &
-                     piece)
+   !> Append a body. The default mass of a free body is density times area. Its default moment of inertia is that of
+   !> its mass spread evenly over the polygon. The default mass and moment of inertia of a fixed body are infinite.
+   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, masses, material, piece)
       class(body_list_t), intent(inout) :: self
       !> Vertices in world coordinates, clockwise or anticlockwise, those of each piece in turn, (2, vertex) [m]
       real(wp), intent(in) :: vertices(:, :)
@@ -84,10 +83,8 @@ contains
       real(wp), intent(in), optional :: angular_velocity
       !> Identifier; the position in the list plus `id_offset` if absent
       integer(ip), intent(in), optional :: id
-      !> Mass instead of that of the polygon [kg/m]
-      real(wp), intent(in), optional :: mass
-      !> Moment of inertia instead of that of the polygon [kg m]
-      real(wp), intent(in), optional :: inertia
+      !> Mass [kg/m] and moment of inertia [kg m] instead of those of the polygon; 0: not given
+      real(wp), intent(in), optional :: masses(2)
       !> Number of its material, 0 if absent
       integer(ip), intent(in), optional :: material
       !> Number of the piece of each vertex, from 0 and ascending by steps of 1; absent: one piece
@@ -108,8 +105,10 @@ contains
       if (present(density)) body%density = density
       if (present(velocity)) body%velocity = velocity
       if (present(angular_velocity)) body%angular_velocity = angular_velocity
-      if (present(mass)) body%mass = mass
-      if (present(inertia)) body%inertia = inertia
+      if (present(masses)) then
+         body%mass = masses(1)
+         body%inertia = masses(2)
+      end if
       if (present(material)) body%material = material
       associate (n => self%polygons%n)
          if (.not. allocated(self%body)) allocate (self%body(64))

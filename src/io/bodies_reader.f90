@@ -172,8 +172,7 @@ contains
                           velocity=real(block%velocity(:, k), wp), &
                           angular_velocity=real(block%angular_velocity(k), wp), &
                           id=table%id(s), &
-                          mass=real(block%mass(k), wp), &
-                          inertia=real(block%inertia(k), wp), &
+                          masses=real([block%mass(k), block%inertia(k)], wp), &
                           material=material, &
                           piece=pieces_of(table, s))
       end do

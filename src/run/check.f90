@@ -8,7 +8,7 @@ module polydem_check
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
    use polydem_monitor, only: check_step, new_monitor, monitor_t
-   use polydem_run_output, only: count_frames
+   use polydem_output_intervals, only: count_frames
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
@@ -71,7 +71,8 @@ contains
       call new_monitor(monitor, simulation)
       call warn_of_risks(simulation, measures, log, monitor%at_start)
       ! A body that is too fast at the start moves too far in the first step.
-      call check_motion(simulation%motion_check, simulation%bodies, simulation%step, simulation%dt, error)
+      call check_motion(simulation%motion_check, simulation%bodies, simulation%moving(:simulation%n_moving), &
+                        simulation%step, simulation%dt, error)
       call check_step(monitor, simulation, .true., log, error)
    end subroutine warn_at_start
 

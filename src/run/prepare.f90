@@ -16,9 +16,9 @@ module polydem_prepare
    use polydem_restart, only: remove_surplus_files, find_restart
    use polydem_result_files, only: overlaps_name
    use polydem_run, only: run_t
-   use polydem_run_output, only: choose_intervals
+   use polydem_output_intervals, only: choose_intervals
    use polydem_settings, only: settings_t
-   use polydem_start, only: build_start, recall
+   use polydem_begin_run, only: build_start, recall
    use polydem_start_from, only: find_origin, origin_t
    use polydem_start_materials, only: material_names_text
    use polydem_wall_names, only: wall_names_text

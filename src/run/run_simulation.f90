@@ -12,9 +12,10 @@ module polydem_run_simulation
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
-   use polydem_run_output, only: end_step, finish, needs_table, write_stage
+   use polydem_finish, only: finish
+   use polydem_run_output, only: end_step, needs_table, write_stage
    use polydem_settings, only: settings_t
-   use polydem_start, only: open_output
+   use polydem_begin_run, only: open_output
    use polydem_start_from, only: return_to_state
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance

@@ -5,7 +5,7 @@ module polydem_expand
    use polydem_group_instances, only: instance_t, new_instance
    use polydem_parts, only: parts_t
    use polydem_resolve_entries, only: write_group
-   use polydem_scene, only: find_parts
+   use polydem_recipes, only: find_parts
    use polydem_settings, only: settings_t
    implicit none
    private

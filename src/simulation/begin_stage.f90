@@ -8,6 +8,7 @@ module polydem_begin_stage
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_stage
    use polydem_run_stages, only: run_stages_t
+   use polydem_settings, only: forces_settings_t, settings_t, stage_settings_t
    use polydem_simulation, only: simulation_t
    use polydem_sort, only: place_in
    use polydem_source_locations, only: place_of
@@ -19,29 +20,30 @@ module polydem_begin_stage
 contains
 
    !> Take the parameters of the first stage, before the simulation starts.
-   subroutine prepare_stages(self)
-      !> The simulation with its settings
-      type(simulation_t), intent(inout) :: self
+   subroutine prepare_stages(settings, stages)
+      !> Settings; gravity and drag of &forces become those of the first stage
+      type(settings_t), intent(inout) :: settings
+      type(run_stages_t), intent(inout) :: stages
 
-      if (size(self%settings%stage) == 0) return
-      self%stages%gravity = self%settings%forces%gravity
-      self%stages%drag = self%settings%forces%drag
-      self%stages%number = 1_ip
-      self%stages%first = [0_lp]
-      call set_parameters(self, 1_ip)
+      if (size(settings%stage) == 0) return
+      stages%gravity = settings%forces%gravity
+      stages%drag = settings%forces%drag
+      stages%number = 1_ip
+      stages%first = [0_lp]
+      call set_parameters(settings%stage(1), stages, settings%forces)
    end subroutine prepare_stages
 
    !> Take the parameters of a stage.
-   subroutine set_parameters(self, number)
-      type(simulation_t), intent(inout) :: self
-      integer(ip), intent(in) :: number
+   subroutine set_parameters(stage, stages, forces)
+      type(stage_settings_t), intent(in) :: stage
+      type(run_stages_t), intent(inout) :: stages
+      !> Gravity and drag of the present stage
+      type(forces_settings_t), intent(inout) :: forces
 
-      associate (stage => self%settings%stage(number), stages => self%stages, forces => self%settings%forces)
-         forces%gravity = stages%gravity
-         if (size(stage%gravity) == 2) forces%gravity = stage%gravity
-         forces%drag = stages%drag + stage%drag
-         stages%friction_scale = stage%friction_scale
-      end associate
+      forces%gravity = stages%gravity
+      if (size(stage%gravity) == 2) forces%gravity = stage%gravity
+      forces%drag = stages%drag + stage%drag
+      stages%friction_scale = stage%friction_scale
    end subroutine set_parameters
 
    !> Begin the next stage at the end of a step. Collective.
@@ -57,7 +59,7 @@ contains
          stages%is_decided = .false.
          stages%held_since = -1_lp
          stages%value = -1.0_wp
-         call set_parameters(self, stages%number)
+         call set_parameters(self%settings%stage(stages%number), stages, self%settings%forces)
          if (self%settings%stage(stages%number)%until == 'strain') stages%reference = wall_vector(self)
       end associate
       associate (gravity => self%settings%forces%gravity)
@@ -65,7 +67,7 @@ contains
             self%energy_balance, self%comm, self%dt, former, gravity, self%bodies)
       end associate
       call use_parameters(self)
-      call find_last_steps(self)
+      call find_last_steps(self%settings%stage, self%dt, self%stages, self%n_steps)
    end subroutine begin_stage
 
    !> Let force law, other forces, free flight, motions and loads use the parameters of the present stage.
@@ -107,26 +109,30 @@ contains
    end subroutine set_window
 
    !> Find the last step of the present stage, unless its condition has decided it, and of the run.
-   subroutine find_last_steps(self)
-      !> The simulation with its time step
-      type(simulation_t), intent(inout) :: self
+   subroutine find_last_steps(settings, dt, stages, n_steps)
+      !> Settings of all stages
+      type(stage_settings_t), intent(in) :: settings(:)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      type(run_stages_t), intent(inout) :: stages
+      !> Greatest number of steps of the run
+      integer(lp), intent(out) :: n_steps
       integer(ip) :: k
 
-      associate (stages => self%stages, settings => self%settings%stage)
-         if (.not. stages%is_decided) stages%last = stages%first(stages%number) + steps_of(self, stages%number)
-         self%n_steps = stages%last
-         do k = stages%number + 1_ip, size(settings, kind=ip)
-            self%n_steps = self%n_steps + steps_of(self, k)
-         end do
-      end associate
+      if (.not. stages%is_decided) stages%last = stages%first(stages%number) + steps_of(settings(stages%number), dt)
+      n_steps = stages%last
+      do k = stages%number + 1_ip, size(settings, kind=ip)
+         n_steps = n_steps + steps_of(settings(k), dt)
+      end do
    end subroutine find_last_steps
 
    !> Greatest number of steps of a stage
-   pure integer(lp) function steps_of(self, number)
-      type(simulation_t), intent(in) :: self
-      integer(ip), intent(in) :: number
+   pure integer(lp) function steps_of(stage, dt)
+      type(stage_settings_t), intent(in) :: stage
+      !> Time step [s]
+      real(wp), intent(in) :: dt
 
-      steps_of = max(1_lp, nint(longest_stage(self%settings%stage(number))/self%dt, lp))
+      steps_of = max(1_lp, nint(longest_stage(stage)/dt, lp))
    end function steps_of
 
    !> Go on in the stage of a checkpoint, at the start with the first stage. Collective; all ranks get the same error.
@@ -142,9 +148,9 @@ contains
                     'namelist has only '//to_text(size(self%settings%stage, kind=ip))//' groups &stage')
          return
       end if
-      call set_parameters(self, self%stages%number)
+      call set_parameters(self%settings%stage(self%stages%number), self%stages, self%settings%forces)
       call use_parameters(self)
-      call find_last_steps(self)
+      call find_last_steps(self%settings%stage, self%dt, self%stages, self%n_steps)
       associate (stage => self%settings%stage(self%stages%number))
          if (self%step > self%stages%last) call raise(error, input_error, place_of(self%settings, &
             'stage.'//stage%name, merge('duration', 'longest ', stage%until == 'duration'))//': the run is at step '// &

@@ -43,12 +43,11 @@ contains
       call keep_fixed(done + 1_ip, self%bodies%n, self%force_sums, self%bodies)
       if (self%settings%output%energy_balance) call count_step(self%energy_balance)
       if (allocated(self%record%sums)) call self%record%accumulate(self%named, self%bodies, self%loop%walls, 1.0_wp)
-      associate (moving => self%motion_check%moving)
-         do k = n + 1_ip, size(moving, kind=ip)
-            good = good .and. move_within_limit(self%motion_check, self%bodies, moving(k), moving(k), self%dt)
-         end do
-      end associate
-      if (.not. good) call check_motion(self%motion_check, self%bodies, self%step, self%dt, error)
+      do k = n + 1_ip, self%n_moving
+         good = good .and. move_within_limit(self%motion_check, self%bodies, self%moving(k), self%moving(k), self%dt)
+      end do
+      if (.not. good) &
+         call check_motion(self%motion_check, self%bodies, self%moving(:self%n_moving), self%step, self%dt, error)
    end subroutine complete_step
 
    !> Complete the step of a part of the free bodies, block by block, and keep the forces on fixed bodies between them.

@@ -5,8 +5,10 @@
 !> order for any number of threads (see `polydem_force_sums`).
 module polydem_contact_loop
    use omp_lib, only: omp_get_max_threads
+   use polydem_bodies, only: bodies_t
    use polydem_clock, only: wall_seconds
    use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_rows, only: append_rows, gather_rows, release_rows, start_rows
    use polydem_contacts, only: contacts_t, is_degenerate
@@ -76,7 +78,12 @@ contains
       !$omp end parallel
       self%loop%step = self%step
       call balance_ranges(self%loop%elapsed(:n), self%loop%upto)
-      call gather_results(self, n)
+      call gather_results(n, .not. allocated(self%law%constraint), self%loop, self%contacts)
+      associate (ranges => self%loop%ranges(:n))
+         self%n_contacts = sum(ranges%n_contacts)
+         self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
+         self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(sum(ranges%n_degenerate), lp)
+      end associate
       if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%loop%incidence)
       call check_contacts(self%settings%overlap%degenerate, self%bodies, self%loop%flagged, self%step, error)
    end subroutine loop_over_contacts
@@ -136,7 +143,8 @@ contains
             high = min(high, low - 1_ip)
          end if
          call add_terms(block, terms, last(2), self%force_sums, self%loop%ranges(r)%late)
-         call keep_contacts(self, r, block, terms)
+         call count_block(self%domain%has_halo(), self%bodies, block, self%loop%ranges(r))
+         call keep_contacts(r, self%bodies, block, terms, self%history, self%loop)
          call own_clock%end_part(2)
       end do
       call clear_sums(last(1) + 1_ip, high, self%force_sums)
@@ -163,74 +171,71 @@ contains
       end associate
    end subroutine start_results
 
-   !> Count the contacts of a block, test them by the guards, and keep those that are needed after the loop.
-   subroutine keep_contacts(self, r, block, terms)
-      type(simulation_t), intent(inout) :: self
+   !> Test the contacts of a block by the guards, and keep those that are needed after the loop.
+   subroutine keep_contacts(r, bodies, block, terms, history, loop)
       !> Index of the range
       integer(ip), intent(in) :: r
+      type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(in) :: block
       type(contact_terms_t), intent(in) :: terms
+      !> Contact history; the direction is read and set
+      type(contact_history_t), intent(inout) :: history
+      type(loop_results_t), intent(inout) :: loop
       logical :: suspect(block_size), some
 
-      associate (loop => self%loop)
-         call count_block(self, block, loop%ranges(r))
-         if (loop%has_table) call append_rows(block, loop%all_of(r), with_forces=.true.)
-         call append_walls(self%bodies%fixed, block, terms, loop%walls_of(r))
-         if (self%bodies%cell%is_sheared) call append_border(self%bodies, block, terms, loop%walls_of(r)%border)
-         call test_block(loop%flag_limits, self%bodies, block, self%history, suspect, some, &
-                         loop%ranges(r)%passing_pair)
-         if (some) call append_rows(block, loop%flagged_of(r), with_forces=.true., chosen=suspect)
-      end associate
+      if (loop%has_table) call append_rows(block, loop%all_of(r), with_forces=.true.)
+      call append_walls(bodies%fixed, block, terms, loop%walls_of(r))
+      if (bodies%cell%is_sheared) call append_border(bodies, block, terms, loop%walls_of(r)%border)
+      call test_block(loop%flag_limits, bodies, block, history, suspect, some, loop%ranges(r)%passing_pair)
+      if (some) call append_rows(block, loop%flagged_of(r), with_forces=.true., chosen=suspect)
    end subroutine keep_contacts
 
    !> Count the contacts that this rank owns, and those without direction.
-   subroutine count_block(self, block, results)
-      type(simulation_t), intent(in) :: self
+   subroutine count_block(has_halo, bodies, block, results)
+      !> Whether other ranks own some of the bodies
+      logical, intent(in) :: has_halo
+      type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(in) :: block
       type(range_results_t), intent(inout) :: results
       logical :: owned(block_size)
 
-      if (.not. self%domain%has_halo()) then
+      if (.not. has_halo) then
          results%n_contacts = results%n_contacts + block%n
          results%n_degenerate = results%n_degenerate + count(block%degenerate(:block%n) > 0.0_wp, kind=ip)
          return
       end if
-      call find_owned_pairs(block%n, block%first, block%second, self%bodies%in_halo, self%bodies%fixed, owned)
+      call find_owned_pairs(block%n, block%first, block%second, bodies%in_halo, bodies%fixed, owned)
       results%n_contacts = results%n_contacts + count(owned(:block%n), kind=ip)
       results%n_degenerate = results%n_degenerate &
                              + count(owned(:block%n) .and. block%degenerate(:block%n) > 0.0_wp, kind=ip)
    end subroutine count_block
 
    !> Join the results of n ranges.
-   subroutine gather_results(self, n)
-      type(simulation_t), intent(inout) :: self
+   subroutine gather_results(n, releases_rows, loop, contacts)
       integer(ip), intent(in) :: n
-      integer(ip) :: c, r, n_degenerate
+      !> Whether the rows of the table are released
+      logical, intent(in) :: releases_rows
+      type(loop_results_t), intent(inout) :: loop
+      !> Table of all contacts; empty if the loop does not keep it
+      type(contacts_t), intent(inout) :: contacts
+      integer(ip) :: c, r
 
-      self%contacts%n = 0_ip
-      n_degenerate = 0_ip
-      self%n_contacts = 0_ip
-      self%loop%passing_pair = 0_ip
-      associate (loop => self%loop)
-         do r = n, 1_ip, -1_ip
-            self%n_contacts = self%n_contacts + loop%ranges(r)%n_contacts
-            n_degenerate = n_degenerate + loop%ranges(r)%n_degenerate
-            if (loop%ranges(r)%passing_pair > 0_ip) loop%passing_pair = loop%ranges(r)%passing_pair
-         end do
-         if (loop%has_table) call gather_rows(loop%all_of(:n), self%contacts)
-         ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
-         if (loop%has_table .and. .not. allocated(self%law%constraint)) call release_rows(loop%all_of)
-         call gather_rows(loop%flagged_of(:n), loop%flagged)
-      end associate
-      associate (flagged => self%loop%flagged)
+      contacts%n = 0_ip
+      loop%passing_pair = 0_ip
+      do r = n, 1_ip, -1_ip
+         if (loop%ranges(r)%passing_pair > 0_ip) loop%passing_pair = loop%ranges(r)%passing_pair
+      end do
+      if (loop%has_table) call gather_rows(loop%all_of(:n), contacts)
+      ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
+      if (loop%has_table .and. releases_rows) call release_rows(loop%all_of)
+      call gather_rows(loop%flagged_of(:n), loop%flagged)
+      associate (flagged => loop%flagged)
          flagged%n_degenerate = 0_ip
          do c = 1_ip, flagged%n
             if (is_degenerate(flagged, c)) flagged%n_degenerate = flagged%n_degenerate + 1_ip
          end do
-         self%contacts%n_degenerate = flagged%n_degenerate
+         contacts%n_degenerate = flagged%n_degenerate
       end associate
-      self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
-      self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(n_degenerate, lp)
    end subroutine gather_results
 
 end module polydem_contact_loop

@@ -22,8 +22,6 @@ module polydem_motion_check
       type(warning_t) :: warning
       !> Clause that says how to shorten the time step
       character(len=:), allocatable :: remedy
-      !> Slots of the bodies that may move
-      integer(ip), allocatable :: moving(:)
    end type motion_check_t
 
    !> Fraction of the stable time step above which a run warns
@@ -41,20 +39,17 @@ contains
    end function shorter_step
 
    !> Prepare the check for the present bodies.
-   subroutine new_motion_check(check, settings, bodies, moving, remedy)
+   subroutine new_motion_check(check, settings, bodies, remedy)
       !> Limit of the displacement
       type(motion_check_t), intent(out) :: check
       type(guards_settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
-      !> Slots of the bodies that may move
-      integer(ip), intent(in) :: moving(:)
       !> Clause that says how to shorten the time step
       character(len=*), intent(in) :: remedy
 
       check%choice = settings%displacement
       check%remedy = remedy
-      check%moving = moving
       check%limit = displacement_limit(settings, bodies)
    end subroutine new_motion_check
 
@@ -85,19 +80,19 @@ contains
    end function have_valid_poses
 
    !> Stop if a body has an invalid pose, before boxes and neighbours are computed from it.
-   subroutine check_poses(check, bodies, step, error)
-      !> Limit of the displacement
-      type(motion_check_t), intent(in) :: check
+   subroutine check_poses(bodies, moving, step, error)
       !> Bodies in the middle of a step
       type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies that may move
+      integer(ip), intent(in) :: moving(:)
       !> Number of the step
       integer(lp), intent(in) :: step
       !> Names the body and the step
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k
 
-      do k = 1_ip, size(check%moving, kind=ip)
-         associate (s => check%moving(k))
+      do k = 1_ip, size(moving, kind=ip)
+         associate (s => moving(k))
             if (has_valid_pose(bodies, s)) cycle
             call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
                        to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m with angle '// &
@@ -161,11 +156,13 @@ contains
    end subroutine find_coasting
 
    !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
-   subroutine check_motion(check, bodies, step, dt, error)
+   subroutine check_motion(check, bodies, moving, step, dt, error)
       !> Limit of the displacement
       type(motion_check_t), intent(inout) :: check
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies that may move
+      integer(ip), intent(in) :: moving(:)
       !> Number of the step
       integer(lp), intent(in) :: step
       !> Time step [s]
@@ -176,8 +173,8 @@ contains
       logical :: is_first
 
       is_first = .true.
-      do k = 1_ip, size(check%moving, kind=ip)
-         s = check%moving(k)
+      do k = 1_ip, size(moving, kind=ip)
+         s = moving(k)
          if (moves_within_limit(check, bodies, s, dt)) cycle
          if (.not. is_finite(bodies, s, dt)) then
             call raise(error, run_error, motion_text(check, bodies, s, step))

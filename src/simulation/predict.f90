@@ -2,18 +2,20 @@
 !>
 !> The pass does all that it can do for a block of bodies while the block is in the cache.
 module polydem_predict
-   use polydem_bodies, only: block_size
+   use polydem_bodies, only: block_size, bodies_t
    use polydem_body_runs, only: find_run, list_others, number_of_parts
    use polydem_bodies_in_cell, only: put_into_cell, wrap_bodies
    use polydem_boxes_within, only: have_boxes_within
+   use polydem_energy_balance, only: energy_balance_t
    use polydem_errors, only: error_t
    use polydem_motion_check, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
+   use polydem_named_walls, only: named_walls_t
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part
    use polydem_timers, only: block_clock_t
-   use polydem_wall, only: move_wall
-   use polydem_wall_load, only: carry_walls, correct_loads, predict_loads
+   use polydem_wall, only: move_wall, wall_t
+   use polydem_wall_load, only: carry_walls, correct_loads, predict_loads, wall_load_t
    implicit none
    private
    public :: predict_border, predict_bodies, move_walls, yield_walls
@@ -37,11 +39,11 @@ contains
       call self%flight%begin_step(self%neighbours%pairs, self%bodies%n)
       call predict_and_bound(self, good, has_left, clock)
       if (allocated(self%loads)) call predict_loads(self%dt, self%loads)
-      call move_walls(self, time_of(self))
-      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%motion_check%moving, kind=ip)
-         good = good .and. have_valid_poses(self%bodies, self%motion_check%moving(k), self%motion_check%moving(k))
+      call move_walls(self%walls, self%named, time_of(self), self%bodies, self%loads)
+      do k = size(self%bodies%free, kind=ip) + 1_ip, self%n_moving
+         good = good .and. have_valid_poses(self%bodies, self%moving(k), self%moving(k))
       end do
-      if (.not. good) call check_poses(self%motion_check, self%bodies, self%step, error)
+      if (.not. good) call check_poses(self%bodies, self%moving(:self%n_moving), self%step, error)
    end subroutine predict_bodies
 
    !> Predict the bodies of the border, which other ranks wait for. The message does not need their vertices and boxes.
@@ -56,7 +58,7 @@ contains
       !$omp parallel do if (number_of_parts(n) > 1) schedule(static) default(none) shared(self, n) private(low)
       do low = 1_ip, n, block_size
          associate (block => self%domain%halo%border(low:min(low + block_size - 1_ip, n)))
-            if (self%bodies%cell%is_periodic) call return_to_cell(self, block)
+            if (self%bodies%cell%is_periodic) call return_to_cell(self%dt, block, self%bodies, self%energy_balance)
             call self%flight%predict(self%integrator, self%motion_check, self%dt, block, self%bodies)
          end associate
       end do
@@ -129,10 +131,12 @@ contains
 
       if (self%domain%has_halo()) then
          call list_others(size(slots, kind=ip), slots, self%domain%halo%in_border, n, others)
-         if (self%bodies%cell%is_periodic) call return_to_cell(self, others(:n))
+         if (self%bodies%cell%is_periodic) &
+            call return_to_cell(self%dt, others(:n), self%bodies, self%energy_balance)
          call self%flight%predict(self%integrator, self%motion_check, self%dt, others(:n), self%bodies)
       else
-         if (self%bodies%cell%is_periodic) call return_to_cell(self, slots)
+         if (self%bodies%cell%is_periodic) &
+            call return_to_cell(self%dt, slots, self%bodies, self%energy_balance)
          call self%flight%predict(self%integrator, self%motion_check, self%dt, slots, self%bodies)
       end if
       valid = .true.
@@ -145,24 +149,28 @@ contains
 
    !> Return those of up to `block_size` bodies to the cell that have left it. What a sheared border changes of their
    !> momentum and kinetic energy is the work of the border, and counts as that of a wall.
-   subroutine return_to_cell(self, slots)
-      type(simulation_t), intent(inout) :: self
+   subroutine return_to_cell(dt, slots, bodies, balance)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
       !> Slots of the bodies, ascending
       integer(ip), intent(in), contiguous :: slots(:)
+      type(bodies_t), intent(inout) :: bodies
+      !> Balance of energy; not started if the run computes none
+      type(energy_balance_t), intent(inout) :: balance
       real(wp) :: former(block_size), change
       integer(ip) :: k
 
-      if (self%bodies%cell%is_sheared) former(:size(slots)) = self%bodies%velocity(1, slots)
-      call wrap_bodies(self%bodies, slots)
-      if (.not. (self%bodies%cell%is_sheared .and. self%settings%output%energy_balance)) return
+      if (bodies%cell%is_sheared) former(:size(slots)) = bodies%velocity(1, slots)
+      call wrap_bodies(bodies, slots)
+      if (.not. (bodies%cell%is_sheared .and. allocated(balance%wall_sum))) return
       do k = 1_ip, size(slots, kind=ip)
-         associate (m => self%bodies%mass(slots(k)), v => self%bodies%velocity(1, slots(k)), &
-                    wall_sum => self%energy_balance%wall_sum(:, slots(k)))
+         associate (m => bodies%mass(slots(k)), v => bodies%velocity(1, slots(k)), &
+                    wall_sum => balance%wall_sum(:, slots(k)))
             change = v - former(k)
             if (.not. abs(change) > 0.0_wp) cycle
-            wall_sum(1) = wall_sum(1) + 0.5_wp*m*change*(v + former(k))/self%dt
-            wall_sum(2) = wall_sum(2) + m*change/self%dt
-            wall_sum(5) = wall_sum(5) + abs(m*change)/self%dt
+            wall_sum(1) = wall_sum(1) + 0.5_wp*m*change*(v + former(k))/dt
+            wall_sum(2) = wall_sum(2) + m*change/dt
+            wall_sum(5) = wall_sum(5) + abs(m*change)/dt
          end associate
       end do
    end subroutine return_to_cell
@@ -182,17 +190,23 @@ contains
    end subroutine bound_block
 
    !> Move the bodies with prescribed motion to their poses at a given time, and displace them by loads.
-   subroutine move_walls(self, time)
-      type(simulation_t), intent(inout) :: self
+   subroutine move_walls(walls, named, time, bodies, loads)
+      !> Fixed bodies with prescribed motions or loads
+      type(wall_t), intent(in) :: walls(:)
+      !> Walls by name
+      type(named_walls_t), intent(in) :: named
       !> Simulated time [s]
       real(wp), intent(in) :: time
+      type(bodies_t), intent(inout) :: bodies
+      !> Loads on named walls; absent or not allocated: none
+      type(wall_load_t), intent(in), optional :: loads(:)
       integer :: k
 
-      do k = 1, size(self%walls)
-         call move_wall(self%walls(k), time, self%bodies)
-         if (self%bodies%cell%is_periodic) call put_into_cell(self%bodies, self%walls(k)%slots)
+      do k = 1, size(walls)
+         call move_wall(walls(k), time, bodies)
+         if (bodies%cell%is_periodic) call put_into_cell(bodies, walls(k)%slots)
       end do
-      if (allocated(self%loads)) call carry_walls(self%loads, self%named, self%bodies)
+      if (present(loads)) call carry_walls(loads, named, bodies)
    end subroutine move_walls
 
    !> Find the velocities of the walls that yield to loads from the contacts. Their places do not change. Collective.
@@ -203,7 +217,7 @@ contains
       real(wp), intent(in) :: dt
 
       call correct_loads(self%loads, self%comm, dt, time_of(self), self%named, self%bodies, self%loop%walls)
-      call move_walls(self, time_of(self))
+      call move_walls(self%walls, self%named, time_of(self), self%bodies, self%loads)
    end subroutine yield_walls
 
 end module polydem_predict

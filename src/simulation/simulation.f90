@@ -30,7 +30,7 @@ module polydem_simulation
    use polydem_thread_results, only: loop_results_t
    implicit none
    private
-   public :: simulation_t, former_direction, time_of, compute_balance
+   public :: simulation_t, relaxation_t, former_direction, time_of, compute_balance
    public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: contacts, pairs that began, pairs that ended, contacts without direction
@@ -136,6 +136,8 @@ module polydem_simulation
       type(free_flight_t) :: flight
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
+      !> Number of those of them that are no halo bodies
+      integer(ip) :: n_moving = 0_ip
       !> Sums over all steps, (`sum_contacts` to `sum_degenerate`)
       integer(lp) :: sums(n_sums) = 0_lp
    end type simulation_t

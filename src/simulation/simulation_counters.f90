@@ -1,5 +1,6 @@
 !> Exact counters of a simulation, summed over all ranks.
 module polydem_simulation_counters
+   use polydem_communicator, only: communicator_t
    use polydem_communication_counters, only: report_communication
    use polydem_counters, only: counters_t, over_steps
    use polydem_kinds, only: ip, lp
@@ -57,14 +58,16 @@ contains
    end subroutine report_counters
 
    !> Count the contacts of all ranks. Collective.
-   subroutine count_contacts(simulation, n)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine count_contacts(comm, own, n)
+      class(communicator_t), intent(inout) :: comm
+      !> Number of contacts that this rank owns
+      integer(ip), intent(in) :: own
       !> Number of contacts
       integer(ip), intent(out) :: n
       integer(lp) :: counts(1)
 
-      counts = int(simulation%n_contacts, lp)
-      call simulation%comm%all_reduce_sum(counts)
+      counts = int(own, lp)
+      call comm%all_reduce_sum(counts)
       n = int(counts(1), ip)
    end subroutine count_contacts
 

@@ -6,12 +6,14 @@ module polydem_time_step
    use polydem_box_maker, only: turn_and_bound
    use polydem_boxes_within, only: have_boxes_within
    use polydem_complete, only: complete_step
+   use polydem_contact_history, only: contact_history_t
    use polydem_contact_loop, only: loop_over_contacts
    use polydem_energy_balance, only: begin_step
    use polydem_errors, only: error_t, raise, run_error
    use polydem_exchange_bodies, only: exchange_bodies
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
+   use polydem_pair_list, only: pair_list_t
    use polydem_predict, only: predict_bodies, predict_border, yield_walls
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
@@ -117,8 +119,8 @@ contains
          return
       end if
       call self%flight%turn_joined(self%neighbours%pairs, self%bodies)
-      call carry_history(self)
-      call restore_history(self)
+      call carry_history(self%neighbours%pairs, self%history)
+      call restore_history(self%received_history, self%bodies, self%neighbours%pairs, self%history)
       associate (pairs => self%neighbours%pairs)
          self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
          self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
@@ -198,17 +200,16 @@ contains
    end subroutine tabulate_contacts
 
    !> Apply the moves of the pair list to the columns of the contact history.
-   subroutine carry_history(self)
-      type(simulation_t), intent(inout) :: self
+   subroutine carry_history(pairs, history)
+      type(pair_list_t), intent(inout) :: pairs
+      type(contact_history_t), intent(inout) :: history
       integer :: k
 
-      associate (pairs => self%neighbours%pairs, history => self%history)
-         call pairs%carry(history%features, 0_ip)
-         if (.not. allocated(history%column)) return
-         do k = 1, size(history%column)
-            call pairs%carry(history%column(k)%value, 0.0_wp)
-         end do
-      end associate
+      call pairs%carry(history%features, 0_ip)
+      if (.not. allocated(history%column)) return
+      do k = 1, size(history%column)
+         call pairs%carry(history%column(k)%value, 0.0_wp)
+      end do
    end subroutine carry_history
 
 end module polydem_time_step

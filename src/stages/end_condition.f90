@@ -57,15 +57,17 @@ contains
       associate (stage => simulation%settings%stage(simulation%stages%number))
          select case (stage%until)
          case ('kinetic')
-            call kinetic_energy(simulation, value)
+            call kinetic_energy(simulation%bodies, simulation%comm, value)
          case ('unbalanced')
-            call unbalanced_force(simulation, value)
+            call unbalanced_force(simulation%settings%forces%gravity, simulation%contacts, simulation%comm, &
+                                  simulation%bodies, simulation%force_sums, value)
          case ('count')
-            call count_grains(simulation, stage%low, stage%high, value)
+            call count_grains(simulation%bodies, simulation%comm, stage%low, stage%high, value)
          case ('stress')
             call measure_stress(simulation, stage%component, value)
          case ('solid_fraction')
-            call solid_fraction(simulation, sample_area_t(stage%low, stage%high, stage%high - stage%low), value)
+            call solid_fraction(simulation%bodies, simulation%comm, sample_area_t(stage%low, stage%high, &
+                                stage%high - stage%low), value)
          case default
             associate (reference => simulation%stages%reference)
                moved = wall_vector(simulation) - reference
@@ -87,7 +89,7 @@ contains
       real(wp) :: tensor(2, 2)
 
       call find_area(simulation, area)
-      call stress(simulation, area, tensor)
+      call stress(simulation%bodies, simulation%contacts, simulation%comm, area, tensor)
       if (component == 'pressure') then
          value = abs(0.5_wp*(tensor(1, 1) + tensor(2, 2)))
       else
@@ -114,7 +116,7 @@ contains
             stages%last = min(stages%last, step + 1_lp)
          end associate
       end associate
-      call find_last_steps(simulation)
+      call find_last_steps(simulation%settings%stage, simulation%dt, simulation%stages, simulation%n_steps)
    end subroutine decide_end
 
    !> Whether a value fulfils the condition of a stage

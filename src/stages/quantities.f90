@@ -5,15 +5,15 @@
 module polydem_quantities
    use polydem_bodies, only: bodies_t
    use polydem_cell, only: cell_t
-   use polydem_contacts, only: contact_force
+   use polydem_communicator, only: communicator_t
+   use polydem_contacts, only: contact_force, contacts_t
    use polydem_elementary, only: hypotenuse
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
-   use polydem_force_sums, only: total_forces
+   use polydem_force_sums, only: force_sums_t, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_sample_area, only: sample_area_t
-   use polydem_simulation, only: simulation_t
    implicit none
    private
    public :: kinetic_energy, unbalanced_force, coordination, count_grains, solid_fraction, stress, flow, &
@@ -22,81 +22,85 @@ module polydem_quantities
 contains
 
    !> Find the kinetic energy per free body [J/m]; 0 if there is none. Collective.
-   subroutine kinetic_energy(simulation, energy)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine kinetic_energy(bodies, comm, energy)
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
       !> Mean kinetic energy of translation and rotation
       real(wp), intent(out) :: energy
       real(wp) :: total(2)
       type(exact_sum_t) :: sums(2)
       integer(ip) :: k
 
-      associate (bodies => simulation%bodies)
-         do k = 1_ip, size(bodies%free, kind=ip)
-            associate (s => bodies%free(k))
-               call sums(1)%add(0.5_wp*bodies%mass(s)*(bodies%velocity(1, s)**2 + bodies%velocity(2, s)**2) &
-                                + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2)
-               call sums(2)%add(1.0_wp)
-            end associate
-         end do
-      end associate
-      call all_reduce_exact_sums(simulation%comm, sums)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (s => bodies%free(k))
+            call sums(1)%add(0.5_wp*bodies%mass(s)*(bodies%velocity(1, s)**2 + bodies%velocity(2, s)**2) &
+                             + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2)
+            call sums(2)%add(1.0_wp)
+         end associate
+      end do
+      call all_reduce_exact_sums(comm, sums)
       total = sums%value()
       energy = ratio(total(1), total(2))
    end subroutine kinetic_energy
 
    !> Find the unbalanced force: the mean magnitude of the total force on a free body, with gravity, over the mean
    !> magnitude of the force of a contact. Huge if there is no contact. Collective.
-   subroutine unbalanced_force(simulation, unbalanced)
-      !> The simulation with the table of contacts of this step
-      type(simulation_t), intent(inout) :: simulation
+   subroutine unbalanced_force(gravity, contacts, comm, bodies, force_sums, unbalanced)
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Table of the contacts of this step
+      type(contacts_t), intent(in) :: contacts
+      class(communicator_t), intent(inout) :: comm
+      !> Bodies; the total forces are set
+      type(bodies_t), intent(inout) :: bodies
+      type(force_sums_t), intent(inout) :: force_sums
       !> Ratio of the means
       real(wp), intent(out) :: unbalanced
       type(exact_sum_t) :: sums(4)
       real(wp) :: total(4), force(2)
       integer(ip) :: c, k
 
-      associate (bodies => simulation%bodies, contacts => simulation%contacts)
-         call total_forces(simulation%settings%forces%gravity, simulation%force_sums, bodies)
-         do k = 1_ip, size(bodies%free, kind=ip)
-            call sums(1)%add(hypotenuse(bodies%force(1, bodies%free(k)), bodies%force(2, bodies%free(k))))
-            call sums(2)%add(1.0_wp)
-         end do
-         do c = 1_ip, contacts%n
-            if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
-            force = contact_force(contacts, c)
-            call sums(3)%add(hypotenuse(force(1), force(2)))
-            call sums(4)%add(1.0_wp)
-         end do
-      end associate
-      call all_reduce_exact_sums(simulation%comm, sums)
+      call total_forces(gravity, force_sums, bodies)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         call sums(1)%add(hypotenuse(bodies%force(1, bodies%free(k)), bodies%force(2, bodies%free(k))))
+         call sums(2)%add(1.0_wp)
+      end do
+      do c = 1_ip, contacts%n
+         if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+         force = contact_force(contacts, c)
+         call sums(3)%add(hypotenuse(force(1), force(2)))
+         call sums(4)%add(1.0_wp)
+      end do
+      call all_reduce_exact_sums(comm, sums)
       total = sums%value()
       unbalanced = huge(1.0_wp)
       if (total(3) > 0.0_wp) unbalanced = ratio(total(1), total(2))/ratio(total(3), total(4))
    end subroutine unbalanced_force
 
    !> Find the coordination: the mean number of contacts of a free body, also with fixed bodies. Collective.
-   subroutine coordination(simulation, number)
-      !> The simulation with the table of contacts of this step
-      type(simulation_t), intent(inout) :: simulation
+   subroutine coordination(bodies, contacts, comm, number)
+      type(bodies_t), intent(in) :: bodies
+      !> Table of the contacts of this step
+      type(contacts_t), intent(in) :: contacts
+      class(communicator_t), intent(inout) :: comm
       !> Mean number of contacts
       real(wp), intent(out) :: number
       integer(lp) :: counts(2)
       integer(ip) :: c
 
-      associate (bodies => simulation%bodies, contacts => simulation%contacts)
-         counts = [0_lp, size(bodies%free, kind=lp)]
-         do c = 1_ip, contacts%n
-            counts(1) = counts(1) + merge(1_lp, 0_lp, is_mine(bodies, contacts%first(c))) &
-                        + merge(1_lp, 0_lp, is_mine(bodies, contacts%second(c)))
-         end do
-      end associate
-      call simulation%comm%all_reduce_sum(counts)
+      counts = [0_lp, size(bodies%free, kind=lp)]
+      do c = 1_ip, contacts%n
+         counts(1) = counts(1) + merge(1_lp, 0_lp, is_mine(bodies, contacts%first(c))) &
+                     + merge(1_lp, 0_lp, is_mine(bodies, contacts%second(c)))
+      end do
+      call comm%all_reduce_sum(counts)
       number = ratio(real(counts(1), wp), real(counts(2), wp))
    end subroutine coordination
 
    !> Count the free bodies whose centres are in a rectangle. Collective.
-   subroutine count_grains(simulation, low, high, number)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine count_grains(bodies, comm, low, high, number)
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
       !> Lower left and upper right corner of the rectangle, (2) [m]
       real(wp), intent(in) :: low(2), high(2)
       !> Their number
@@ -105,19 +109,18 @@ contains
       integer(ip) :: k
 
       counts = 0_lp
-      associate (bodies => simulation%bodies)
-         do k = 1_ip, size(bodies%free, kind=ip)
-            if (is_inside(bodies%position(:, bodies%free(k)), low, high)) counts = counts + 1_lp
-         end do
-      end associate
-      call simulation%comm%all_reduce_sum(counts)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         if (is_inside(bodies%position(:, bodies%free(k)), low, high)) counts = counts + 1_lp
+      end do
+      call comm%all_reduce_sum(counts)
       number = real(counts(1), wp)
    end subroutine count_grains
 
    !> Find the solid fraction in an area: the area of the free bodies whose centres are in it, over its area.
    !> Collective.
-   subroutine solid_fraction(simulation, area, fraction)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine solid_fraction(bodies, comm, area, fraction)
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
       !> The area
       type(sample_area_t), intent(in) :: area
       !> The fraction; overlaps count twice
@@ -126,13 +129,11 @@ contains
       real(wp) :: total(1)
       integer(ip) :: k
 
-      associate (bodies => simulation%bodies)
-         do k = 1_ip, size(bodies%free, kind=ip)
-            if (is_inside(bodies%position(:, bodies%free(k)), area%low, area%high)) &
-               call sums(1)%add(bodies%pieces%area_of(bodies%free(k)))
-         end do
-      end associate
-      call all_reduce_exact_sums(simulation%comm, sums)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         if (is_inside(bodies%position(:, bodies%free(k)), area%low, area%high)) &
+            call sums(1)%add(bodies%pieces%area_of(bodies%free(k)))
+      end do
+      call all_reduce_exact_sums(comm, sums)
       total = sums%value()
       fraction = total(1)/(area%size(1)*area%size(2))
    end subroutine solid_fraction
@@ -141,9 +142,11 @@ contains
    !> product of the vector from the centre of the body to the contact and the force on the body, over the area, with
    !> the sign of soil mechanics: positive in compression. For contacts in equilibrium this is the formula of Love and
    !> Weber. Collective.
-   subroutine stress(simulation, area, tensor)
-      !> The simulation with the table of contacts of this step
-      type(simulation_t), intent(inout) :: simulation
+   subroutine stress(bodies, contacts, comm, area, tensor)
+      type(bodies_t), intent(in) :: bodies
+      !> Table of the contacts of this step
+      type(contacts_t), intent(in) :: contacts
+      class(communicator_t), intent(inout) :: comm
       !> Area of the sample
       type(sample_area_t), intent(in) :: area
       !> Stress, (direction of the vector, direction of the force) [N/m2]
@@ -152,14 +155,12 @@ contains
       real(wp) :: force(2)
       integer(ip) :: c
 
-      associate (bodies => simulation%bodies, contacts => simulation%contacts)
-         do c = 1_ip, contacts%n
-            force = contact_force(contacts, c)
-            if (counts(contacts%first(c))) call add(contacts%arm_first(:, c), force)
-            if (counts(contacts%second(c))) call add(contacts%arm_second(:, c), -force)
-         end do
-      end associate
-      call all_reduce_exact_sums(simulation%comm, sums)
+      do c = 1_ip, contacts%n
+         force = contact_force(contacts, c)
+         if (counts(contacts%first(c))) call add(contacts%arm_first(:, c), force)
+         if (counts(contacts%second(c))) call add(contacts%arm_second(:, c), -force)
+      end do
+      call all_reduce_exact_sums(comm, sums)
       tensor = reshape(-sums%value(), [2, 2])/area%size(1)/area%size(2)
 
    contains
@@ -181,8 +182,8 @@ contains
          !> Slot of the body
          integer(ip), intent(in) :: s
 
-         counts = is_mine(simulation%bodies, s)
-         if (counts) counts = is_inside(simulation%bodies%position(:, s), area%low, area%high)
+         counts = is_mine(bodies, s)
+         if (counts) counts = is_inside(bodies%position(:, s), area%low, area%high)
       end function counts
 
    end subroutine stress
@@ -190,8 +191,9 @@ contains
    !> Find the rate at which the bodies in an area shear: that of the linear field of velocities that fits them best, by
    !> least squares; and the mean size and density of these bodies. Along an axis of a periodic cell the field does not
    !> change, but for the jump at the border of a sheared cell. Collective.
-   subroutine flow(simulation, area, rate, diameter, density)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine flow(bodies, comm, area, rate, diameter, density)
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
       !> Area of the sample
       type(sample_area_t), intent(in) :: area
       !> Difference of the principal rates of strain, which is the rate of a simple shear; 0 without bodies [1/s]
@@ -205,7 +207,7 @@ contains
       integer(ip) :: k
       integer :: i
 
-      associate (bodies => simulation%bodies, cell => simulation%bodies%cell)
+      associate (cell => bodies%cell)
          origin = merge(area%low, 0.0_wp, area%high < huge(1.0_wp))
          do k = 1_ip, size(bodies%free, kind=ip)
             associate (s => bodies%free(k))
@@ -219,7 +221,7 @@ contains
                call sums(i)%add(total(i))
             end do
          end do
-         call all_reduce_exact_sums(simulation%comm, sums)
+         call all_reduce_exact_sums(comm, sums)
          total = sums%value()
          diameter = diameter_of_area*sqrt(ratio(total(2), total(1)))
          density = ratio(total(3), total(2))

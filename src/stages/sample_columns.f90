@@ -21,12 +21,13 @@ contains
       type(named_values_t), intent(inout) :: row
       real(wp) :: value
 
-      call kinetic_energy(simulation, value)
+      call kinetic_energy(simulation%bodies, simulation%comm, value)
       call row%set('kinetic_energy', value, 'J/m', 'mean kinetic energy of a free body')
-      call unbalanced_force(simulation, value)
+      call unbalanced_force(simulation%settings%forces%gravity, simulation%contacts, simulation%comm, &
+                            simulation%bodies, simulation%force_sums, value)
       call row%set('unbalanced_force', defined(value), '1', &
                    'mean total force on a free body over the mean force of a contact')
-      call coordination(simulation, value)
+      call coordination(simulation%bodies, simulation%contacts, simulation%comm, value)
       call row%set('coordination', value, '1', 'mean number of contacts of a free body')
       if (has_area(simulation)) call set_averages(simulation, row)
    end subroutine set_sample_columns
@@ -39,9 +40,9 @@ contains
       real(wp) :: tensor(2, 2), fraction, rate, diameter, density, number
 
       call find_area(simulation, area)
-      call solid_fraction(simulation, area, fraction)
-      call stress(simulation, area, tensor)
-      call flow(simulation, area, rate, diameter, density)
+      call solid_fraction(simulation%bodies, simulation%comm, area, fraction)
+      call stress(simulation%bodies, simulation%contacts, simulation%comm, area, tensor)
+      call flow(simulation%bodies, simulation%comm, area, rate, diameter, density)
       number = inertial_number(rate, diameter, density, 0.5_wp*(tensor(1, 1) + tensor(2, 2)))
       call row%set('sample_width', area%size(1), 'm', 'width of the area of the sample')
       call row%set('sample_height', area%size(2), 'm', 'height of the area of the sample')

@@ -328,7 +328,7 @@ contains
       integer(ip) :: n
 
       if (allocated(error)) return
-      call count_contacts(simulation, n)
+      call count_contacts(simulation%comm, simulation%n_contacts, n)
       call expect(n > 30_ip, 'the heap has too few contacts')
    end subroutine expect_contacts
 

@@ -136,7 +136,7 @@ contains
       depth = mass*gravity/(young*width)*2.0_wp*height*floor/(height + floor)
       start = drive%place*unit
       distance = 0.5_wp*(width + post) - press
-      call list%append(block_at(start, 0.5_wp*height - depth, width, height, 0.0_wp), inertia=1.0e6_wp, &
+      call list%append(block_at(start, 0.5_wp*height - depth, width, height, 0.0_wp), masses=[0.0_wp, 1.0e6_wp], &
                        velocity=[drive%velocity*unit*frequency, 0.0_wp])
       call list%append(block_at(distance, 0.5_wp*height, post, thickness, 0.0_wp), fixed=.true.)
       call list%append(block_at(-distance, 0.5_wp*height, post, thickness, 0.0_wp), fixed=.true.)

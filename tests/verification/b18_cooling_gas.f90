@@ -124,9 +124,9 @@ contains
 
       distance = sqrt(max(0.0_wp, 4.0_wp*radius**2 - offset**2)) + 0.01_wp*radius
       call list%append(regular_polygon(n_corners, radius, 0.0_wp, 0.0_wp, first), velocity=[0.5_wp*speed, 0.0_wp], &
-                       inertia=1.0e6_wp)
+                       masses=[0.0_wp, 1.0e6_wp])
       call list%append(regular_polygon(n_corners, radius, distance, offset, second), velocity=[-0.5_wp*speed, 0.0_wp], &
-                       inertia=1.0e6_wp)
+                       masses=[0.0_wp, 1.0e6_wp])
       call begin('&forces damping_coefficient = '//to_text(damping)//rest, list, simulation, error)
    end subroutine aim
 
@@ -182,13 +182,13 @@ contains
          x = side*((real(modulo(k - 1, across), wp) + 0.5_wp)/real(across, wp) - 0.5_wp)
          y = side*((real((k - 1)/across, wp) + 0.5_wp)/real(across, wp) - 0.5_wp)
          call list%append(regular_polygon(corners, radius, x, y, random%between(0.0_wp, 2.0_wp*pi)), &
-                          velocity=velocity(:, k) - sum(velocity, 2)/real(across**2, wp), inertia=1.0e6_wp)
+                          velocity=velocity(:, k) - sum(velocity, 2)/real(across**2, wp), masses=[0.0_wp, 1.0e6_wp])
       end do
       do k = -1, 1, 2
          call list%append(block_at(real(k, wp)*(0.5_wp*side + 0.01_wp), 0.0_wp, 0.02_wp, side, 0.0_wp), fixed=.true., &
-                          mass=1.0e-12_wp)
+                          masses=[1.0e-12_wp, 0.0_wp])
          call list%append(block_at(0.0_wp, real(k, wp)*(0.5_wp*side + 0.01_wp), side + 0.04_wp, 0.02_wp, 0.0_wp), &
-                          fixed=.true., mass=1.0e-12_wp)
+                          fixed=.true., masses=[1.0e-12_wp, 0.0_wp])
       end do
       call begin('&forces damping_coefficient = '//to_text(gas_damping)//rest, list, simulation, error)
    end subroutine fill

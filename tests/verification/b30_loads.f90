@@ -95,7 +95,7 @@ contains
       if (allocated(error)) return
       width = 0.1_wp + simulation%loads(2)%place
       height = 0.301_wp + simulation%loads(1)%place
-      call stress(simulation, sample_area_t(size=[width, height]), tensor)
+      call stress(simulation%bodies, simulation%contacts, simulation%comm, sample_area_t(size=[width, height]), tensor)
       call table%expect_relative('at rest: stress of the contacts, ''between'' two walls [N/m]', 2.0e3_wp, &
                                  tensor(2, 2), 1.0e-3_wp)
       call table%expect_relative('at rest: stress of the contacts, on a given width [N/m]', 1.0e3_wp*0.3_wp/height, &
@@ -174,7 +174,8 @@ contains
          width = 2.0_wp*side_of(number) + simulation%loads(1)%place
          ! Top and bottom bodies belong to walls that are nowhere else.
          height = top_of(simulation) - (-side_of(number))
-         call stress(simulation, sample_area_t(size=[width, height]), tensor)
+         call stress(simulation%bodies, simulation%contacts, simulation%comm, sample_area_t(size=[width, height]), &
+                     tensor)
          sums = sums + [tensor(1, 1), tensor(2, 2)*width, force_of_top(simulation)]
          n = n + 1
       end do

@@ -99,12 +99,12 @@ contains
                             + real(frame%position(:, j), wp)
          end do
          if (fixed(k) == 1_ip) then
-            call list%append(corners, fixed=.true., id=id(k), mass=real(mass(k), wp), inertia=real(inertia(k), wp), &
+            call list%append(corners, fixed=.true., id=id(k), masses=real([mass(k), inertia(k)], wp), &
                              material=material(k), piece=piece(start(k) + 1_ip:start(k + 1_ip)))
          else
             call list%append(corners, velocity=real(frame%velocity(:, j), wp), &
-                             angular_velocity=real(frame%spin(j), wp), id=id(k), mass=real(mass(k), wp), &
-                             inertia=real(inertia(k), wp), material=material(k), &
+                             angular_velocity=real(frame%spin(j), wp), id=id(k), &
+                             masses=real([mass(k), inertia(k)], wp), material=material(k), &
                              piece=piece(start(k) + 1_ip:start(k + 1_ip)))
          end if
       end do

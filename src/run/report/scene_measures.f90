@@ -4,6 +4,7 @@ module polydem_scene_measures
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
+   use polydem_contacts, only: contacts_t
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
@@ -89,13 +90,16 @@ contains
       integer(ip) :: slot
       integer :: k
 
-      call count_parts(simulation, measures)
       associate (s => simulation, comm => simulation%comm)
+         measures%fixed_boxes = count(s%boxes%fixed(:s%boxes%n), kind=lp)
+         measures%boxes = count(.not. s%boxes%passive(:s%boxes%n), kind=lp)
+         call count_parts(comm, s%bodies, s%contacts, s%settings%guards%listed_depth, measures)
+         if (allocated(s%bodies%material)) call count_materials(comm, s%bodies, s%law%pairs%n_materials, measures)
          call measure_bodies(comm, s%bodies, measures)
          if (measures%free > 0_lp) measures%diameter(2) = s%maker%median_diameter
          measures%stiffness = s%law%pairs%stiffness%least()
          if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, measures)
-         call greatest_displacement(s%bodies, s%motion_check%moving, s%dt, measures%move, slot)
+         call greatest_displacement(s%bodies, s%moving(:s%n_moving), s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%walls)
@@ -113,8 +117,8 @@ contains
          end if
          measures%last_bit = spacing(maxval(abs(measures%free_extent)))
       end associate
-      call find_stored_energy(simulation, measures%stored)
-      call measure_contacts(simulation, measures)
+      call find_stored_energy(simulation%comm, simulation%bodies, simulation%contacts, measures%stored)
+      call measure_contacts(simulation%comm, simulation%bodies, simulation%contacts, measures)
       call find_stable_step(simulation, measures%stable_step, slot)
 
    contains
@@ -129,31 +133,31 @@ contains
    end subroutine measure_scene
 
    !> Count bodies, vertices, boxes and contacts.
-   subroutine count_parts(simulation, measures)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine count_parts(comm, bodies, contacts, limit, measures)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      !> Depth of the contacts that are listed, as a share of the thickness of the thinner body
+      real(wp), intent(in) :: limit
+      !> Numbers of bodies, vertices, boxes and contacts are set; on entry `boxes` is that of this rank
       type(scene_measures_t), intent(inout) :: measures
       integer(lp) :: counts(5)
       integer(ip) :: c, k
 
       counts = 0_lp
-      associate (bodies => simulation%bodies, boxes => simulation%boxes, contacts => simulation%contacts, &
-                 limit => simulation%settings%guards%listed_depth)
-         measures%fixed = count(bodies%fixed, kind=lp)
-         measures%fixed_boxes = count(boxes%fixed(:boxes%n), kind=lp)
-         counts(1) = size(bodies%free, kind=lp)
-         do k = 1_ip, bodies%n
-            if (owns_body(simulation%comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
-               counts(2) = counts(2) + int(bodies%pieces%vertex_start(k + 1_ip) - bodies%pieces%vertex_start(k), lp)
-         end do
-         counts(3) = count(.not. boxes%passive(:boxes%n), kind=lp)
-         do c = 1_ip, contacts%n
-            if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
-            counts(4) = counts(4) + 1_lp
-            if (depth_share(contacts, bodies%thickness, c) > limit) counts(5) = counts(5) + 1_lp
-         end do
-      end associate
-      call simulation%comm%all_reduce_sum(counts)
-      if (allocated(simulation%bodies%material)) call count_materials(simulation, measures)
+      measures%fixed = count(bodies%fixed, kind=lp)
+      counts(1) = size(bodies%free, kind=lp)
+      do k = 1_ip, bodies%n
+         if (owns_body(comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
+            counts(2) = counts(2) + int(bodies%pieces%vertex_start(k + 1_ip) - bodies%pieces%vertex_start(k), lp)
+      end do
+      counts(3) = measures%boxes
+      do c = 1_ip, contacts%n
+         if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+         counts(4) = counts(4) + 1_lp
+         if (depth_share(contacts, bodies%thickness, c) > limit) counts(5) = counts(5) + 1_lp
+      end do
+      call comm%all_reduce_sum(counts)
       measures%free = counts(1)
       measures%corners = counts(2)
       measures%boxes = counts(3) + measures%fixed_boxes
@@ -162,24 +166,28 @@ contains
    end subroutine count_parts
 
    !> Count the bodies of each material.
-   subroutine count_materials(simulation, measures)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine count_materials(comm, bodies, n_materials, measures)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: n_materials
       type(scene_measures_t), intent(inout) :: measures
       integer(ip) :: k
 
-      allocate (measures%of_material(0:simulation%law%pairs%n_materials), source=0_lp)
-      associate (bodies => simulation%bodies, n => measures%of_material)
+      allocate (measures%of_material(0:n_materials), source=0_lp)
+      associate (n => measures%of_material)
          do k = 1_ip, bodies%n
-            if (owns_body(simulation%comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
+            if (owns_body(comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
                n(bodies%material(k)) = n(bodies%material(k)) + 1_lp
          end do
       end associate
-      call simulation%comm%all_reduce_sum(measures%of_material)
+      call comm%all_reduce_sum(measures%of_material)
    end subroutine count_materials
 
    !> Find the deepest contact in terms of its thinner body, and that with the greatest depth in metres.
-   subroutine measure_contacts(simulation, measures)
-      type(simulation_t), intent(inout) :: simulation
+   subroutine measure_contacts(comm, bodies, contacts, measures)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
       type(scene_measures_t), intent(inout) :: measures
       real(wp) :: depth, greatest
       integer(lp) :: place, longest
@@ -188,27 +196,25 @@ contains
       place = 0_lp
       longest = 0_lp
       greatest = -1.0_wp
-      associate (bodies => simulation%bodies, contacts => simulation%contacts)
-         worst = deepest_contact(contacts, bodies%thickness)
-         if (worst > 0_ip) then
-            measures%depth_share = depth_share(contacts, bodies%thickness, worst)
-            measures%deepest = depth_text(bodies, contacts, bodies%thickness, worst)
-            place = place_of(bodies, contacts%first(worst), contacts%second(worst))
-         end if
-         do c = 1_ip, contacts%n
-            depth = contacts%area(c)/contacts%length(c)
-            if (depth <= greatest) cycle
-            greatest = depth
-            worst = c
-         end do
-         if (worst > 0_ip) then
-            longest = place_of(bodies, contacts%first(worst), contacts%second(worst))
-            measures%longest_depth = to_text(greatest, 3)//' m between the bodies '// &
-               to_text(bodies%id(contacts%first(worst)))//' and '//to_text(bodies%id(contacts%second(worst)))
-         end if
-      end associate
-      call keep_greatest(simulation%comm, measures%depth_share, place, measures%deepest)
-      call keep_greatest(simulation%comm, greatest, longest, measures%longest_depth)
+      worst = deepest_contact(contacts, bodies%thickness)
+      if (worst > 0_ip) then
+         measures%depth_share = depth_share(contacts, bodies%thickness, worst)
+         measures%deepest = depth_text(bodies, contacts, bodies%thickness, worst)
+         place = place_of(bodies, contacts%first(worst), contacts%second(worst))
+      end if
+      do c = 1_ip, contacts%n
+         depth = contacts%area(c)/contacts%length(c)
+         if (depth <= greatest) cycle
+         greatest = depth
+         worst = c
+      end do
+      if (worst > 0_ip) then
+         longest = place_of(bodies, contacts%first(worst), contacts%second(worst))
+         measures%longest_depth = to_text(greatest, 3)//' m between the bodies '// &
+            to_text(bodies%id(contacts%first(worst)))//' and '//to_text(bodies%id(contacts%second(worst)))
+      end if
+      call keep_greatest(comm, measures%depth_share, place, measures%deepest)
+      call keep_greatest(comm, greatest, longest, measures%longest_depth)
    end subroutine measure_contacts
 
    !> Find the extents and the thinnest body.

@@ -81,7 +81,7 @@ contains
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
-         call find_walls(s, former)
+         call find_walls(former, s%bodies%id, s%walls)
          call settle_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run

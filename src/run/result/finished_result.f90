@@ -14,7 +14,7 @@ module polydem_finished_result
    use polydem_result_files, only: name_in, profile_name
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
-   use polydem_start, only: build_start
+   use polydem_begin_run, only: build_start
    implicit none
    private
    public :: find_finished_result, is_finished

@@ -10,6 +10,7 @@ module polydem_exchange_bodies
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_cell, only: nearest_copy
    use polydem_changed_bodies, only: count_entering, find_leaving_totals, n_totals, take_leaving
+   use polydem_communicator, only: communicator_t
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
@@ -60,29 +61,30 @@ contains
       call new_bodies(list, added, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call count_masses(self, added, origin)
+      call count_masses(self%comm, added, origin, self%traffic%sources)
       if (self%settings%output%energy_balance) call count_entering(self%energy_balance, self%comm, self%dt, &
          self%settings%forces%gravity, added)
       call replace_bodies(self, kept, added, error)
    end subroutine exchange_bodies
 
    !> Count the masses of bodies that enter, in the order of their identifiers. Collective.
-   subroutine count_masses(self, added, origin)
-      type(simulation_t), intent(inout) :: self
+   subroutine count_masses(comm, added, origin, sources)
+      class(communicator_t), intent(inout) :: comm
       !> Bodies of this rank that enter
       type(bodies_t), intent(in) :: added
       !> Number of the source of each one of all ranks
       integer, intent(in) :: origin(:)
+      type(source_t), intent(inout) :: sources(:)
       integer(lp), allocatable :: index(:)
       real(dp), allocatable :: mass(:)
       integer(ip), allocatable :: counts(:), order(:)
       integer :: k
 
-      call self%comm%gather(int(added%global_index, lp), index, counts)
-      call self%comm%gather(real(added%mass, dp), mass, counts)
+      call comm%gather(int(added%global_index, lp), index, counts)
+      call comm%gather(real(added%mass, dp), mass, counts)
       order = ascending_order(index)
       do k = 1, size(order)
-         associate (source => self%traffic%sources(origin(k)))
+         associate (source => sources(origin(k)))
             source%mass = source%mass + real(mass(order(k)), wp)
          end associate
       end do

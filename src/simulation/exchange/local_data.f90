@@ -1,21 +1,26 @@
 !> Parts of a simulation that depend on the bodies of a rank: measures of the force law, boxes, pair list with contact
 !> history, guards.
 module polydem_local_data
+   use polydem_bodies, only: bodies_t
    use polydem_bodies_in_cell, only: find_folds
    use polydem_box_maker, only: new_box_maker
+   use polydem_communicator, only: communicator_t
    use polydem_contact_history, only: add_column, column_of, contact_history_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_force_law, only: force_law_t
    use polydem_force_sums, only: start_sums
-   use polydem_motion_check, only: displacement_limit, new_motion_check, shorter_step, warn_share
+   use polydem_motion_check, only: displacement_limit, motion_check_t, new_motion_check, shorter_step, &
+      warn_share
    use polydem_global_reductions, only: reduce_to_least
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: restart_neighbours
    use polydem_contact_flags, only: new_flag_limits
+   use polydem_settings, only: guards_settings_t
    use polydem_simulation, only: simulation_t, former_direction
    use polydem_stable_step, only: stiffest_product
+   use polydem_wall, only: wall_t
    implicit none
    private
    public :: rebuild_local_data, limit_displacement
@@ -50,15 +55,16 @@ contains
                              self%body_forces%act() .or. self%bodies%cell%is_sheared .or. &
                              self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
       self%loop%incidence = incidence_t()
-      call list_moving(self)
-      call rebuild_guard(self)
+      call list_moving(self%bodies, self%walls, self%moving, self%n_moving)
+      if (.not. allocated(self%motion_check%choice)) call new_motion_check( &
+         self%motion_check, self%settings%guards, self%bodies, shorter_step(self%settings%integrate))
       associate (choice => self%settings%boxes)
          call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error, &
             median_diameter, self%domain%margin)
       end associate
       if (allocated(error)) return
       call restart_neighbours(self%neighbours, self%boxes)
-      call allocate_history(self)
+      call allocate_history(self%law, self%settings%guards, self%history)
       call new_flag_limits(self%loop%flag_limits, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
       if (self%settings%guards%step /= 'off') self%loop%flag_limits%soft = &
@@ -66,14 +72,17 @@ contains
    end subroutine rebuild_local_data
 
    !> Limit the displacement of a step to that of the thinnest body of all ranks. Collective.
-   subroutine limit_displacement(self)
-      !> The simulation with its guard
-      type(simulation_t), intent(inout) :: self
+   subroutine limit_displacement(settings, bodies, comm, check)
+      type(guards_settings_t), intent(in) :: settings
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
+      !> The check; its limit is set
+      type(motion_check_t), intent(inout) :: check
       real(wp) :: limit(1)
 
-      limit = displacement_limit(self%settings%guards, self%bodies)
-      call reduce_to_least(self%comm, limit)
-      self%motion_check%limit = limit(1)
+      limit = displacement_limit(settings, bodies)
+      call reduce_to_least(comm, limit)
+      check%limit = limit(1)
    end subroutine limit_displacement
 
    !> Empty a table of contacts, and give it the columns that the law needs.
@@ -88,44 +97,38 @@ contains
       call reserve_contacts(contacts, 0_ip)
    end subroutine fit_table
 
-   !> Rebuild the guard for the present bodies. After the start only the list of bodies changes.
-   subroutine rebuild_guard(self)
-      type(simulation_t), intent(inout) :: self
-      integer :: n
-
-      n = size(self%moving) - count(self%bodies%in_halo)
-      associate (check => self%motion_check)
-         if (.not. allocated(check%moving)) call new_motion_check(check, self%settings%guards, self%bodies, &
-                                                         self%moving(:n), shorter_step(self%settings%integrate))
-         check%moving = self%moving(:n)
-      end associate
-   end subroutine rebuild_guard
-
    !> Allocate the columns of the contact history: those of the force law, at the places known to its parts, then those
    !> of the guards.
-   subroutine allocate_history(self)
-      type(simulation_t), intent(inout) :: self
+   subroutine allocate_history(law, settings, history)
+      type(force_law_t), intent(in) :: law
+      type(guards_settings_t), intent(in) :: settings
+      type(contact_history_t), intent(out) :: history
       integer :: k
 
-      self%history = contact_history_t()
-      allocate (self%history%features(0))
-      do k = 1, size(self%law%history_kinds)
-         call add_column(self%history, self%law%history_kinds(k), 0_ip)
+      allocate (history%features(0))
+      do k = 1, size(law%history_kinds)
+         call add_column(history, law%history_kinds(k), 0_ip)
       end do
-      if (self%settings%guards%tunnelling /= 'off') call add_column(self%history, former_direction, 0_ip)
+      if (settings%tunnelling /= 'off') call add_column(history, former_direction, 0_ip)
    end subroutine allocate_history
 
    !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.
-   subroutine list_moving(self)
-      type(simulation_t), intent(inout) :: self
+   subroutine list_moving(bodies, walls, moving, n_moving)
+      type(bodies_t), intent(in) :: bodies
+      !> Fixed bodies with prescribed motions or loads
+      type(wall_t), intent(in) :: walls(:)
+      integer(ip), allocatable, intent(out) :: moving(:)
+      !> Number of slots before the halo bodies
+      integer(ip), intent(out) :: n_moving
       integer :: k
       integer(ip) :: s
 
-      self%moving = self%bodies%free
-      do k = 1, size(self%walls)
-         self%moving = [self%moving, self%walls(k)%slots]
+      moving = bodies%free
+      do k = 1, size(walls)
+         moving = [moving, walls(k)%slots]
       end do
-      self%moving = [self%moving, pack([(s, s=1_ip, self%bodies%n)], self%bodies%in_halo)]
+      n_moving = size(moving, kind=ip)
+      moving = [moving, pack([(s, s=1_ip, bodies%n)], bodies%in_halo)]
    end subroutine list_moving
 
 end module polydem_local_data

@@ -5,16 +5,21 @@
 !> ascending order of global index. The pair list is rebuilt from scratch, and the contact history of the pairs is
 !> restored. At the start of a run the bodies of a rank are anywhere; the first redistribution gives each rank its own.
 module polydem_redistribution
-   use polydem_bodies, only: piece_identifiers, turn_bodies
+   use polydem_bodies, only: bodies_t, piece_identifiers, turn_bodies
+   use polydem_box_images, only: box_images_t
    use polydem_boxes_within, only: have_boxes_within
+   use polydem_communicator, only: communicator_t
+   use polydem_contact_history, only: contact_history_t
+   use polydem_domain, only: domain_t
    use polydem_errors, only: error_t
    use polydem_motion_check, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_data, only: rebuild_local_data
    use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, copy_packed, join_packed
-   use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs, slots_of_pair
+   use polydem_packed_history, only: pack_pairs, packed_history_t, receive_pairs, send_pairs, slots_of_pair
    use polydem_packed_state, only: join_state, pack_state, packed_state_t, send_state, unpack_state
+   use polydem_pair_list, only: pair_list_t
    use polydem_rank_order, only: sort_by_rank
    use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
       work_of_bodies
@@ -67,65 +72,70 @@ contains
       call self%comm%all_reduce_error(error, request)
       if (allocated(error) .or. request(1) == 0_lp) return
       if (self%domain%last_step < 0_lp) then
-         call choose_first_margin(self)
+         call choose_first_margin(self%comm, self%bodies, self%dt, self%domain)
       else
          call self%domain%adapt_margin(self%step)
       end if
       ! When the bodies have just been replaced, there are no pairs that tell the work of a rank.
-      if (self%domain%last_step < 0_lp .or. allocated(self%domain%reference)) call balance_work(self)
+      if (self%domain%last_step < 0_lp .or. allocated(self%domain%reference)) call balance_work( &
+         self%comm, self%step, self%bodies, self%neighbours%pairs, real(sum(self%timers%total(work_stages)), dp), &
+         self%domain)
       call migrate(self, error)
    end subroutine redistribute
 
    !> Choose the margin of the first redistribution from the speeds of the free bodies. Collective.
-   subroutine choose_first_margin(self)
-      type(simulation_t), intent(inout) :: self
+   subroutine choose_first_margin(comm, bodies, dt, domain)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      type(domain_t), intent(inout) :: domain
       real(wp) :: move
       real(dp) :: greatest(1)
       integer(ip) :: slot
 
-      call greatest_displacement(self%bodies, self%bodies%free, self%dt, move, slot)
+      call greatest_displacement(bodies, bodies%free, dt, move, slot)
       greatest = real(move, dp)
-      call self%comm%all_reduce_max(greatest)
-      call self%domain%choose_margin(real(greatest(1), wp))
+      call comm%all_reduce_max(greatest)
+      call domain%choose_margin(real(greatest(1), wp))
    end subroutine choose_first_margin
 
    !> Partition space again if the work of the ranks is uneven.
-   subroutine balance_work(self)
-      type(simulation_t), intent(inout) :: self
+   subroutine balance_work(comm, step, bodies, pairs, seconds, domain)
+      class(communicator_t), intent(inout) :: comm
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      type(bodies_t), intent(in) :: bodies
+      !> Pairs of the last step
+      type(pair_list_t), intent(in) :: pairs
+      !> Time spent so far in the stages that depend on the bodies [s]
+      real(dp), intent(in) :: seconds
+      type(domain_t), intent(inout) :: domain
       real(dp), allocatable :: weight(:)
-      real(dp) :: seconds
 
-      associate (pairs => self%neighbours%pairs)
-         weight = work_of_bodies(self%bodies, pairs%n, pairs%first, pairs%second)
-      end associate
-      seconds = work_seconds(self)
-      if (needs_repartition(self%domain, self%comm, self%step, weight, seconds)) &
-         call divide(self%domain, self%comm, self%step, self%bodies, weight, seconds)
+      weight = work_of_bodies(bodies, pairs%n, pairs%first, pairs%second)
+      if (needs_repartition(domain, comm, step, weight, seconds)) &
+         call divide(domain, comm, step, bodies, weight, seconds)
    end subroutine balance_work
 
    !> Restore the contact history of pairs after a redistribution, a restart or a replacement of bodies. A no-op
    !> otherwise.
-   subroutine restore_history(self)
-      !> The simulation, directly after the pair search
-      type(simulation_t), intent(inout) :: self
+   subroutine restore_history(received, bodies, pairs, history)
+      !> History that was received; not allocated on return
+      type(packed_history_t), allocatable, intent(inout) :: received
+      type(bodies_t), intent(in) :: bodies
+      !> Pairs directly after their search; known ones did not begin
+      type(pair_list_t), intent(inout) :: pairs
+      !> History of these pairs
+      type(contact_history_t), intent(inout) :: history
       integer(ip) :: n_known
 
-      if (.not. allocated(self%received_history)) return
-      associate (pairs => self%neighbours%pairs)
-         call receive_pairs(self%received_history, pairs%n, pairs%first, pairs%second, &
-                            piece_identifiers(self%bodies), self%history, n_known)
-         pairs%n_began = pairs%n_began - n_known
-         pairs%n_ended = pairs%n_ended + size(self%received_history%key, kind=ip) - n_known
-      end associate
-      deallocate (self%received_history)
+      if (.not. allocated(received)) return
+      call receive_pairs(received, pairs%n, pairs%first, pairs%second, piece_identifiers(bodies), history, n_known)
+      pairs%n_began = pairs%n_began - n_known
+      pairs%n_ended = pairs%n_ended + size(received%key, kind=ip) - n_known
+      deallocate (received)
    end subroutine restore_history
-
-   !> Time spent so far in the stages that depend on the bodies [s]
-   pure real(dp) function work_seconds(self)
-      type(simulation_t), intent(in) :: self
-
-      work_seconds = sum(self%timers%total(work_stages))
-   end function work_seconds
 
    !> Migrate all bodies to their owners in the present partition, and rebuild the halo.
    subroutine migrate(self, error)
@@ -136,7 +146,7 @@ contains
       integer(ip) :: k
 
       owner = owners_of(self%domain, self%bodies)
-      call send_history(self, owner)
+      call send_history(self%comm, self%bodies, self%neighbours%pairs, self%history, owner, self%received_history)
       call send_bodies(self, owner, own)
       call receive_halo(self, own)
       call self%domain%halo%follow(self%comm, self%bodies)
@@ -144,7 +154,7 @@ contains
       call rebuild_local_data(self, error, self%domain%median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call measure_halo(self)
+      call measure_halo(self%comm, self%maker%images, self%bodies%n_all, self%domain)
       call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
       associate (domain => self%domain)
          domain%redistributions = domain%redistributions + 1_lp
@@ -157,27 +167,32 @@ contains
 
    !> Send the contact history of all pairs to the next owners of their bodies. The history that a restart has read
    !> belongs to pairs that are not found yet, and so does that of a replacement of bodies.
-   subroutine send_history(self, owner)
-      type(simulation_t), intent(inout) :: self
+   subroutine send_history(comm, bodies, pairs, history, owner, received)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      type(pair_list_t), intent(in) :: pairs
+      !> History of these pairs
+      type(contact_history_t), intent(in) :: history
+      !> Rank that owns each body from now on, negative for fixed bodies, (slot)
       integer(ip), intent(in) :: owner(:)
+      !> On entry history that no pair has yet, if there is any; on return that of the pairs of this rank
+      type(packed_history_t), allocatable, intent(inout) :: received
       integer(ip), allocatable :: slots(:, :), id(:)
       integer(ip) :: p
 
-      associate (pairs => self%neighbours%pairs, bodies => self%bodies)
-         id = piece_identifiers(bodies)
-         if (allocated(self%received_history)) then
-            allocate (slots(2, size(self%received_history%key)))
-            do p = 1_ip, size(slots, 2, kind=ip)
-               slots(:, p) = bodies%pieces%bodies_of(slots_of_pair(id, self%received_history%key(p)))
-            end do
-         else
-            allocate (self%received_history, slots(2, pairs%n))
-            call pack_pairs(pairs%n, pairs%first, pairs%second, id, self%history, self%received_history)
-            slots(1, :) = bodies%pieces%bodies_of(pairs%first(:pairs%n))
-            slots(2, :) = bodies%pieces%bodies_of(pairs%second(:pairs%n))
-         end if
-         call send_pairs(self%comm, slots, merge(-1_ip, owner, bodies%in_halo), self%received_history)
-      end associate
+      id = piece_identifiers(bodies)
+      if (allocated(received)) then
+         allocate (slots(2, size(received%key)))
+         do p = 1_ip, size(slots, 2, kind=ip)
+            slots(:, p) = bodies%pieces%bodies_of(slots_of_pair(id, received%key(p)))
+         end do
+      else
+         allocate (received, slots(2, pairs%n))
+         call pack_pairs(pairs%n, pairs%first, pairs%second, id, history, received)
+         slots(1, :) = bodies%pieces%bodies_of(pairs%first(:pairs%n))
+         slots(2, :) = bodies%pieces%bodies_of(pairs%second(:pairs%n))
+      end if
+      call send_pairs(comm, slots, merge(-1_ip, owner, bodies%in_halo), received)
    end subroutine send_history
 
    !> Pack the bodies that stay on this rank, send the others to their owners, and join those that arrive. Fixed bodies
@@ -254,14 +269,18 @@ contains
    end subroutine receive_halo
 
    !> Measure what the margin costs in each step: halo bodies, and images of boxes. Collective.
-   subroutine measure_halo(self)
-      type(simulation_t), intent(inout) :: self
+   subroutine measure_halo(comm, images, n_all, domain)
+      class(communicator_t), intent(inout) :: comm
+      type(box_images_t), intent(in) :: images
+      !> Number of bodies of the run
+      integer(ip), intent(in) :: n_all
+      type(domain_t), intent(inout) :: domain
       integer(lp) :: n_halo(1)
 
-      n_halo = size(self%domain%halo%slots, kind=lp)
-      if (allocated(self%maker%images%source)) n_halo = n_halo + size(self%maker%images%source, kind=lp)
-      call self%comm%all_reduce_sum(n_halo)
-      self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)
+      n_halo = size(domain%halo%slots, kind=lp)
+      if (allocated(images%source)) n_halo = n_halo + size(images%source, kind=lp)
+      call comm%all_reduce_sum(n_halo)
+      domain%halo_share = real(n_halo(1), wp)/real(n_all, wp)
    end subroutine measure_halo
 
 end module polydem_redistribution

@@ -11,6 +11,7 @@ module polydem_replace_bodies
    use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_changed_bodies, only: start_entering
+   use polydem_communicator, only: communicator_t
    use polydem_energy_balance, only: energy_balance_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_field_sums, only: accelerate_by_fields
@@ -54,7 +55,7 @@ contains
          to_text(self%step)//': there are no identifiers for more bodies')
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call list_removed(self, kept, removed)
+      call list_removed(self%comm, self%bodies, kept, removed)
       call hold_history(self)
       call renumber(removed, self%bodies, added)
       slots = pack([(s, s=1_ip, self%bodies%n)], kept .and. .not. self%bodies%in_halo)
@@ -108,23 +109,22 @@ contains
 
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
       call rebuild_local_data(self, error, self%domain%median_diameter)
-      call limit_displacement(self)
+      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion_check)
       call self%domain%forget_halo()
       call self%comm%all_reduce_error(error)
    end subroutine settle_bodies
 
    !> List the identifiers of the bodies of all ranks that leave, ascending. Collective.
-   subroutine list_removed(self, kept, removed)
-      type(simulation_t), intent(inout) :: self
+   subroutine list_removed(comm, bodies, kept, removed)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
       logical, intent(in) :: kept(:)
       integer(ip), allocatable, intent(out) :: removed(:)
       integer(lp), allocatable :: mine(:), all_of_them(:)
       integer(ip), allocatable :: counts(:)
 
-      associate (bodies => self%bodies)
-         mine = int(pack(bodies%id, owns_body(self%comm%is_root(), bodies%in_halo, bodies%fixed) .and. .not. kept), lp)
-      end associate
-      call self%comm%gather(mine, all_of_them, counts)
+      mine = int(pack(bodies%id, owns_body(comm%is_root(), bodies%in_halo, bodies%fixed) .and. .not. kept), lp)
+      call comm%gather(mine, all_of_them, counts)
       removed = int(all_of_them(ascending_order(all_of_them)), ip)
    end subroutine list_removed
 

@@ -8,6 +8,7 @@
 module polydem_energy_guard
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
+   use polydem_contacts, only: contacts_t
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_global_reductions, only: sum_exactly
@@ -41,26 +42,27 @@ contains
       self%finding = 'that found an unexplained energy gain'
       self%choice = simulation%settings%guards%energy
       self%is_global = .true.
-      if (self%choice /= 'off') call find_stored_energy(simulation, self%stored)
+      if (self%choice /= 'off') call find_stored_energy( &
+         simulation%comm, simulation%bodies, simulation%contacts, self%stored)
    end subroutine start
 
    !> Find the elastic energy of the contacts of all ranks, estimated as half of force times depth. Collective.
-   subroutine find_stored_energy(simulation, stored)
-      !> Simulation with the forces of its contacts
-      type(simulation_t), intent(inout) :: simulation
+   subroutine find_stored_energy(comm, bodies, contacts, stored)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
       !> Elastic energy [J/m]
       real(wp), intent(out) :: stored
       real(wp), allocatable :: terms(:)
       integer(ip) :: c
 
-      associate (contacts => simulation%contacts)
-         allocate (terms(contacts%n), source=0.0_wp)
-         do c = 1_ip, contacts%n
-            if (owns_pair(simulation%bodies, contacts%first(c), contacts%second(c))) &
-               terms(c) = 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
-         end do
-      end associate
-      call sum_exactly(simulation%comm, terms, stored)
+      allocate (terms(contacts%n), source=0.0_wp)
+      do c = 1_ip, contacts%n
+         if (owns_pair(bodies, contacts%first(c), contacts%second(c))) &
+            terms(c) = 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
+      end do
+      call sum_exactly(comm, terms, stored)
    end subroutine find_stored_energy
 
    !> Warn or stop if the unexplained energy gain exceeds its limit. Collective; the result is the same on all ranks.

@@ -2,16 +2,18 @@
 module polydem_choose_step
    use polydem_begin_stage, only: find_last_steps
    use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
+   use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, sum_exactly
    use polydem_kinds, only: ip, lp, wp
+   use polydem_named_walls, only: named_walls_t
    use polydem_run_duration, only: longest_run
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_wall_load, only: wall_mobilities
+   use polydem_wall_load, only: set_masses, wall_load_t, wall_mobilities
    implicit none
    private
    public :: choose_step
@@ -40,6 +42,8 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
+      if (allocated(self%loads)) &
+         call prepare_loads(self%settings%forces%stiffness, self%bodies, self%comm, self%named, self%loads)
       call find_expected_speed(self)
       call stable_step_of_shapes(self%law, self%integrator%stability(), self%bodies, self%expected%speed, stable, &
                                  critical, depth, length, damped, mobility_of_walls(self))
@@ -80,10 +84,26 @@ contains
          call check_number(self, duration, steps, error)
          if (allocated(error)) return
          self%n_steps = nint(steps, lp)
-         if (self%stages%number > 0_ip) call find_last_steps(self)
+         if (self%stages%number > 0_ip) call find_last_steps(self%settings%stage, self%dt, self%stages, &
+                                                                 self%n_steps)
       end associate
       call check_rate(self, error)
    end subroutine choose_step
+
+   !> Set the masses of walls that yield. Collective.
+   subroutine prepare_loads(stiffness, bodies, comm, named, loads)
+      !> Stiffness of the settings [N/m2]
+      real(wp), intent(in) :: stiffness
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
+      type(named_walls_t), intent(inout) :: named
+      type(wall_load_t), intent(inout) :: loads(:)
+      real(wp) :: total
+
+      call named%find_slots(bodies)
+      call sum_exactly(comm, bodies%mass(bodies%free), total)
+      call set_masses(loads, named, bodies, total, stiffness)
+   end subroutine prepare_loads
 
    !> Check the number of steps.
    subroutine check_number(self, duration, steps, error)
@@ -151,6 +171,7 @@ contains
          if (short_number <= number) return
       end do
    end function short_number
+
    !> Greatest mobility of a wall that yields [m/kg], and greatest product of mobility and length of the wall [m2/kg]
    pure function mobility_of_walls(self) result(greatest)
       type(simulation_t), intent(in) :: self

@@ -28,6 +28,7 @@ contains
       !> Names a body that is too large for the cell
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: largest(1)
+      integer(lp) :: n_outside(1)
       integer(ip) :: s
 
       if (self%settings%cell%periodic == 'none') return
@@ -50,7 +51,9 @@ contains
          self%n_outside = count(any(bodies%image(bodies%free, :) /= 0_ip, 2), kind=lp)
          if (self%comm%is_root()) self%n_outside = self%n_outside &
             + count(any(bodies%image /= 0_ip, 2) .and. bodies%fixed, kind=lp)
-         call reduce_count(self)
+         n_outside = self%n_outside
+         call self%comm%all_reduce_sum(n_outside)
+         self%n_outside = n_outside(1)
          ! The cell in which a fixed body starts is its own.
          do s = 1_ip, bodies%n
             if (bodies%fixed(s)) bodies%image(s, :) = 0_ip
@@ -81,16 +84,6 @@ contains
          input_error, place_of(self%settings, 'forces', 'local_damping')//': ''local_damping'' in &forces cannot '// &
          'be combined with this ''friction'', whose forces depend on the motion without it; use drag')
    end subroutine check_constraint
-
-   !> Add up the bodies of all ranks that were outside. Collective.
-   subroutine reduce_count(self)
-      type(simulation_t), intent(inout) :: self
-      integer(lp) :: n(1)
-
-      n = self%n_outside
-      call self%comm%all_reduce_sum(n)
-      self%n_outside = n(1)
-   end subroutine reduce_count
 
    !> Check that a body is small enough for the cell, or spans it.
    subroutine check_size(self, s, largest, error)

@@ -9,6 +9,7 @@
 module polydem_relaxation
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_box_maker, only: update_boxes
+   use polydem_communicator, only: communicator_t
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: incidence_t, index_contacts
@@ -16,13 +17,14 @@ module polydem_relaxation
    use polydem_errors, only: error_t, input_error, raise
    use polydem_find_contacts, only: find_contacts
    use polydem_global_reductions, only: reduce_to_greatest
+   use polydem_halo, only: halo_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_local_data, only: rebuild_local_data
    use polydem_neighbours, only: neighbours_t
    use polydem_new_neighbours, only: new_neighbours
    use polydem_source_locations, only: place_of
    use polydem_redistribution, only: have_boxes_left, redistribute
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: relaxation_t, simulation_t
    use polydem_stable_step, only: contact_numbers
    use polydem_strings, only: to_text
    implicit none
@@ -65,17 +67,17 @@ contains
             if (relaxation%sweeps == 0_ip) relaxation%before = relaxation%after
             if (relaxation%after <= self%settings%scene%remove_overlap) exit
             least = min(least, relaxation%after)
-            call check_progress(self, least, before, is_idle)
+            call check_progress(relaxation, self%bodies, self%comm, least, before, is_idle)
             if (is_idle .or. relaxation%sweeps == most_sweeps) then
                if (worst > 0_ip) call report_depth(self, contacts, worst, is_idle, error)
                call self%comm%all_reduce_error(error)
                return
             end if
-            call push_apart(self, contacts)
+            call push_apart(contacts, self%domain%halo, self%comm, self%bodies)
             relaxation%sweeps = relaxation%sweeps + 1_ip
          end associate
       end do
-      self%relaxation%move = greatest_displacement(self)
+      self%relaxation%move = greatest_displacement(self%bodies, self%relaxation%from, self%comm)
       deallocate (self%relaxation%from)
       ! Images of boxes are chosen for the boxes of the last redistribution.
       if (self%bodies%cell%is_periodic) call self%domain%forget_halo()
@@ -83,23 +85,26 @@ contains
    end subroutine relax_bodies
 
    !> Greatest displacement of a body since the start of the relaxation [m]. Collective.
-   real(wp) function greatest_displacement(self)
-      type(simulation_t), intent(inout) :: self
+   real(wp) function greatest_displacement(bodies, from, comm)
+      type(bodies_t), intent(in) :: bodies
+      !> Positions at the start, (2, slot) [m]
+      real(wp), intent(in) :: from(:, :)
+      class(communicator_t), intent(inout) :: comm
       real(wp) :: greatest(1)
 
       greatest = 0.0_wp
-      associate (bodies => self%bodies, from => self%relaxation%from)
-         if (bodies%n > 0_ip) greatest = sqrt(maxval((bodies%position(1, :) - from(1, :))**2 &
-                                                     + (bodies%position(2, :) - from(2, :))**2,.not. bodies%in_halo))
-      end associate
-      call reduce_to_greatest(self%comm, greatest)
+      if (bodies%n > 0_ip) greatest = sqrt(maxval((bodies%position(1, :) - from(1, :))**2 &
+                                                  + (bodies%position(2, :) - from(2, :))**2,.not. bodies%in_halo))
+      call reduce_to_greatest(comm, greatest)
       greatest_displacement = greatest(1)
    end function greatest_displacement
 
    !> Find out every `most_idle_sweeps` sweeps whether they brought no progress. A pile that spreads from its ends moves
    !> on long before its deepest contact does. Collective.
-   subroutine check_progress(self, least, before, is_idle)
-      type(simulation_t), intent(inout) :: self
+   subroutine check_progress(relaxation, bodies, comm, least, before, is_idle)
+      type(relaxation_t), intent(in) :: relaxation
+      type(bodies_t), intent(in) :: bodies
+      class(communicator_t), intent(inout) :: comm
       !> Least of the greatest depths after each sweep
       real(wp), intent(in) :: least
       !> This depth, and the greatest displacement, at the last check
@@ -108,9 +113,9 @@ contains
       real(wp) :: move
 
       is_idle = .false.
-      if (modulo(self%relaxation%sweeps, most_idle_sweeps) /= 0_ip) return
-      move = greatest_displacement(self)
-      if (self%relaxation%sweeps > 0_ip) is_idle = least > (1.0_wp - least_progress)*before(1) .and. &
+      if (modulo(relaxation%sweeps, most_idle_sweeps) /= 0_ip) return
+      move = greatest_displacement(bodies, relaxation%from, comm)
+      if (relaxation%sweeps > 0_ip) is_idle = least > (1.0_wp - least_progress)*before(1) .and. &
          move < (1.0_wp + least_progress)*before(2)
       before = [least, move]
    end subroutine check_progress
@@ -165,20 +170,22 @@ contains
    end subroutine report_depth
 
    !> One sweep: compute the impulses of all contacts, then move all free bodies. Collective.
-   subroutine push_apart(self, contacts)
-      type(simulation_t), intent(inout) :: self
+   subroutine push_apart(contacts, halo, comm, bodies)
       type(contacts_t), intent(in) :: contacts
+      type(halo_t), intent(inout) :: halo
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(inout) :: bodies
       type(incidence_t) :: incidence
       !> Impulse of each contact, with displacements in place of velocities, (contact) [kg]
       real(wp), allocatable :: impulse(:)
       !> Number of contacts of each body, (slot)
       real(wp), allocatable :: numbers(:)
 
-      call index_contacts(self%bodies%n, contacts, incidence)
-      numbers = contact_numbers(self%bodies%n, incidence)
-      call self%domain%halo%exchange_column(self%comm, numbers)
-      call find_impulses(contacts, numbers, self%bodies, impulse)
-      call move_free(contacts, incidence, impulse, self%bodies)
+      call index_contacts(bodies%n, contacts, incidence)
+      numbers = contact_numbers(bodies%n, incidence)
+      call halo%exchange_column(comm, numbers)
+      call find_impulses(contacts, numbers, bodies, impulse)
+      call move_free(contacts, incidence, impulse, bodies)
    end subroutine push_apart
 
    !> Compute the impulses of all contacts.

@@ -1,0 +1,55 @@
+!> Makes what the settings name: the only module of this layer that uses the factories.
+module polydem_choose_methods
+   use polydem_body_forces, only: body_forces_t, choose_body_forces
+   use polydem_errors, only: error_t
+   use polydem_integrator_factory, only: new_integrator
+   use polydem_kinds, only: ip, wp
+   use polydem_law_factory, only: choose_parts
+   use polydem_new_neighbours, only: choose_finder
+   use polydem_pair_parameters, only: pair_parameters
+   use polydem_settings, only: forces_settings_t, settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_traffic, only: new_traffic
+   implicit none
+   private
+   public :: choose_methods
+
+contains
+
+   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks.
+   subroutine choose_methods(self, error)
+      !> The simulation with its settings, and with the parameters of its first stage
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if there is no such finder, if a setting excludes a part of the law, or if outlines cannot be read
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (settings => self%settings)
+         call choose_parts(settings%forces, self%law, pair_parameters(settings))
+         call self%law%check(settings, 1_ip, error)
+         if (allocated(error)) return
+         call new_traffic(settings, self%traffic, error)
+         if (allocated(error)) return
+         call new_integrator(settings%integrate, self%integrator)
+         call choose_finder(self%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, &
+                            self%bodies%isa)
+         call choose_all_fields(settings, self%stages%drag, self%body_forces)
+      end associate
+   end subroutine choose_methods
+
+   !> Choose the forces that are no contacts: those of any stage, with the parameters of the strongest.
+   subroutine choose_all_fields(settings, drag, body_forces)
+      type(settings_t), intent(in) :: settings
+      !> Drag of the group &forces [1/s]
+      real(wp), intent(in) :: drag
+      type(body_forces_t), intent(out) :: body_forces
+      type(forces_settings_t) :: forces
+      integer :: k
+
+      forces = settings%forces
+      do k = 1, size(settings%stage)
+         forces%drag = max(forces%drag, drag + settings%stage(k)%drag)
+      end do
+      call choose_body_forces(forces, body_forces)
+   end subroutine choose_all_fields
+
+end module polydem_choose_methods
