@@ -62,8 +62,10 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
+      integer(lp) :: first
 
       call write_stage(run)
+      first = run%simulation%step
       if (run%earlier%checkpoint == 0_ip) then
          call end_step(run, error)
          if (.not. allocated(error)) call return_to_state(run%simulation, error)
@@ -79,8 +81,11 @@ contains
          if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
       end do
       call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
-      ! The result is complete without it.
-      if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) call write_checkpoint(run, error)
+      ! The result is complete without it. Before its first step a continued run has no pairs that it could write; the
+      ! checkpoint from which it came is that of its end.
+      if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) then
+         if (run%simulation%step > first .or. run%earlier%checkpoint == 0_ip) call write_checkpoint(run, error)
+      end if
       call run%comm%all_reduce_error(error)
    end subroutine run_steps
 

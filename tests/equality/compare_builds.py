@@ -2,10 +2,13 @@
 
 usage: compare_builds.py SOURCES FOLDER CMAKE PROGRAM [--full]
 
-Without --full only -O0 is compared, which differs most from the -O3 of the preset release.
+Without --full only -O0 is compared, which differs most from the -O3 of the preset release. No build may
+give a warning.
 """
 
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 
@@ -20,7 +23,9 @@ def build(sources, folder, cmake, level):
     options = ["-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_Fortran_FLAGS_RELEASE={level}"]
     for command in (common + options, [cmake, "--build", str(folder)]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
+        if done.returncode != 0 or re.search(r"^(.*: )?Warning: ", done.stdout, re.MULTILINE):
+            # What is compiled gives no warning again.
+            shutil.rmtree(folder)
             sys.exit(done.stdout + done.stderr)
     return folder / "src" / "app" / "polydem"
 

@@ -208,32 +208,21 @@ def test_what_is_published_is_one_page_that_its_tables_confirm_of_other_machines
 def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):
     folder, plan = tmp_path / "paper", small_plan(tmp_path / "plan")
     environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
-    with subprocess.Popen(command(folder, plan=plan), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          env=environment) as process:
-        while not list((folder / "quick" / "gases" / "samples").glob("*-1-2.h5")):
-            assert process.poll() is None
-            time.sleep(0.02)
-        process.send_signal(signal.SIGTERM)
-        said = process.communicate(timeout=600)[0]
-    assert process.returncode == 75 and "the same command goes on" in said, said
-    before = samples_of(folder)
-    assert before
-    code, said = call(folder, plan=plan)
-    assert code == 0, said
-    after = samples_of(folder)
-    assert {path: after[path] for path in before} == before and len(after) > len(before)
-
-
-def test_nothing_goes_on_beside_a_call_after_one_that_was_killed_at_once(tmp_path):
-    folder, plan = tmp_path / "paper", small_plan(tmp_path / "plan")
-    environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
-    with subprocess.Popen(command(folder, plan=plan), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                          env=environment) as process:
-        while not list((folder / "quick" / "gases" / "samples").glob("*-1-0.h5")):
-            assert process.poll() is None
-            time.sleep(0.02)
-        process.kill()
-    before = samples_of(folder)
+    before = {}
+    # At once, and nothing goes on beside the next call; then by a signal that it hears
+    for number, sample, expected in (signal.SIGKILL, "*-1-0.h5", -9), (signal.SIGTERM, "*-1-2.h5", 75):
+        with subprocess.Popen(command(folder, plan=plan), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                              env=environment) as process:
+            while not list((folder / "quick" / "gases" / "samples").glob(sample)):
+                assert process.poll() is None
+                time.sleep(0.02)
+            process.send_signal(number)
+            said = process.communicate(timeout=600)[0]
+        assert process.returncode == expected, said
+        after = samples_of(folder)
+        assert {path: after[path] for path in before} == before and len(after) > len(before)
+        before = after
+    assert "the same command goes on" in said, said
     code, said = call(folder, plan=plan)
     assert code == 0 and said.count(" finished after ") == 2, said
     after = samples_of(folder)

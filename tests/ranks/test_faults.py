@@ -358,9 +358,9 @@ def test_a_disk_that_is_full_loses_nothing(whole, request, tmp_path):
             subprocess.run(["umount", str(disk)], check=True)
 
 
-@pytest.mark.parametrize("name, value", [("CONVERT_UNIT", "big_endian"), ("OPTIONAL_PLUS", "y"), ("STDOUT_UNIT", "5")])
-def test_variables_of_the_fortran_library_change_nothing(name, value, whole, monkeypatch, tmp_path):
-    monkeypatch.setitem(ENVIRONMENT, f"GFORTRAN_{name}", value)
+def test_variables_of_the_fortran_library_change_nothing(whole, monkeypatch, tmp_path):
+    for name, value in (("CONVERT_UNIT", "big_endian"), ("OPTIONAL_PLUS", "y"), ("STDOUT_UNIT", "5")):
+        monkeypatch.setitem(ENVIRONMENT, f"GFORTRAN_{name}", value)
     finish(whole, tmp_path / "result", 2)
 
 

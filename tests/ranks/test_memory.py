@@ -6,7 +6,7 @@ import sys
 from runs import ENVIRONMENT, PARALLEL
 
 #: A scene whose bodies take far more memory than the program and MPI
-BED = """&scene name = 'bed' bodies = 200000 speed = 0.1 /
+BED = """&scene name = 'bed' bodies = 100000 speed = 0.1 /
 &integrate dt = 1e-5 duration = 2e-5 /
 &output energy_balance = .false. /
 """
@@ -25,7 +25,7 @@ def peaks(folder, ranks, bodies):
     results = folder / f"of_{ranks}_{bodies}"
     measured = folder / f"peaks_of_{ranks}_{bodies}"
     measured.mkdir()
-    (folder / "bed.nml").write_text(BED.replace("200000", str(bodies)), encoding="utf-8")
+    (folder / "bed.nml").write_text(BED.replace("100000", str(bodies)), encoding="utf-8")
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", MEASURE, str(measured),
                PARALLEL, "run", str(folder / "bed.nml"), "--threads", "1", "--set", f"output.folder={results}"]
     subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True, timeout=600)
@@ -33,7 +33,7 @@ def peaks(folder, ranks, bodies):
 
 
 def test_each_of_eight_ranks_takes_a_small_share_of_the_memory_of_one(tmp_path):
-    few, many = 1000, 200000
+    few, many = 1000, 100000
     alone = max(peaks(tmp_path, 1, many)) - max(peaks(tmp_path, 1, few))
     shared = peaks(tmp_path, 8, many)
     assert len(shared) == 8

@@ -4,7 +4,7 @@ usage: check_kill_points.py PROGRAM CONTENDED_SYSTEM [all]
 
 CONTENDED_SYSTEM is the library of contended_system.c. It counts the calls of the program to files in the result folder
 and kills the program before the n-th call. A short run is killed at each of the first 24 and last 12 calls, where it
-locks and unlocks the folder, and at every 40th of the others; with `all`, at each. After each kill, --continue must
+locks and unlocks the folder, and at every 120th of the others; with `all`, at each. After each kill, --continue must
 lead to the correct result. After every fourth kill, a copy of the run also starts again with --force.
 """
 
@@ -20,11 +20,12 @@ from check_faults import environment
 from continued_run import run, totals_of, write_scene
 
 #: A run of 20 steps with 7 frames in 4 segments or more, and checkpoints every 7 steps
-SHORT = ("--set", "integrate.duration=2e-4", "--set", "output.frames_per_segment=2", "--set", "checkpoint.steps=7")
+SHORT = ("--set", "integrate.duration=2e-4", "--set", "output.frame_interval=3e-5", "--set",
+         "output.frames_per_segment=2", "--set", "checkpoint.steps=7")
 #: Numbers of first and last points that are always tested: there the run locks and unlocks the folder
 N_FIRST, N_LAST = 24, 12
 #: Stride of the tested points in between
-STRIDE = 40
+STRIDE = 120
 
 
 class Killer:

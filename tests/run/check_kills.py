@@ -19,7 +19,7 @@ import time
 from continued_run import assert_whole, closed_segments, run, start, totals_of, write_scene
 
 #: Checkpoints as often as frames
-OFTEN = ("--set", "checkpoint.steps=7")
+OFTEN = ("--set", "checkpoint.steps=20")
 
 
 def attempt(program, folder, seconds):

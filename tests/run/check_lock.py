@@ -125,7 +125,7 @@ def processes_of_other_namespaces_keep_each_other_out(case, _):
             assert inside.returncode == BAD_INPUT and "another run (process 1)" in inside.stderr, inside
         finally:
             holder.kill()
-    code, output, message = case.run("spaces", *ENDLESS, "--continue", "--walltime", "00:00:10")
+    code, output, message = case.run("spaces", *ENDLESS, "--continue", "--walltime", "00:00:02")
     assert code == EARLY and "took over spaces/running.lock of process 1, which has ended" in output, (output, message)
 
 
@@ -151,7 +151,7 @@ def where_nothing_can_be_locked_a_lock_stays_until_it_is_removed(case, library):
             assert_refused_by_file(case, "unlocked", f"process {process.pid}")
         assert_refused_by_file(case, "unlocked", f"process {process.pid}")
         os.remove(lock_of("unlocked"))
-        code, _, message = case.run("unlocked", *ENDLESS, "--continue", "--walltime", "00:00:05")
+        code, _, message = case.run("unlocked", *ENDLESS, "--continue", "--walltime", "00:00:02")
         assert code == EARLY and not os.path.exists(lock_of("unlocked")), (code, message)
 
 

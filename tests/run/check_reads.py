@@ -14,7 +14,7 @@ call
 * a run can be continued, and ends with the hash of an undisturbed one; an old result is complete until then.
 
 Half of the data (--how short) must change nothing. By default a sample is tried, some calls of --continue and of other
-verbs, until S seconds are over (15); it depends on the programs only. --full and the others are those of
+verbs, until S seconds are over (8); it depends on the programs only. --full and the others are those of
 check_writes.py.
 """
 
@@ -274,7 +274,7 @@ def try_calls(case, options, memory):
     all_calls, broken, outcomes, tried = Counter(), [], Counter(), Counter()
 
     def is_over():
-        return not options.full and tried and time.monotonic() - BEGAN > (options.seconds or 15.0)
+        return not options.full and tried and time.monotonic() - BEGAN > (options.seconds or 8.0)
 
     for verb in verbs:
         if is_over():

@@ -12,7 +12,7 @@ the test is skipped (code 77). A run without a failure counts the calls. After a
 * every checkpoint with its final name is valid;
 * --continue ends with the hash, frames and contacts of an undisturbed run, and leaves no unfinished file.
 
-By default a sample is tried, of all kinds of calls and files in turn, until S seconds are over (15; 50 with ranks); it
+By default a sample is tried, of all kinds of calls and files in turn, until S seconds are over (8; 20 with ranks); it
 depends on the programs only. --full tries all calls, with --part the K-th of N parts of them. HOW is that of
 failing_calls.c, once by default. --memory names a file of calls that passed, which are not tried again by the same
 programs.
@@ -244,7 +244,7 @@ def try_calls(case, options, memory):
     part, parts = (int(word) for word in options.part.split("/"))
     print(f"calls that write, by rank: {dict(Counter(call.rank for call in calls))}; "
           f"{len({call.kind() for call in calls})} kinds", flush=True)
-    seconds = options.seconds or (50.0 if options.ranks else 15.0)
+    seconds = options.seconds or (20.0 if options.ranks else 8.0)
     broken, outcomes, longest = [], Counter(), 0.0
     for call in in_order(calls, memory.key)[part - 1::parts]:
         point = (options.ranks, options.how, options.error, call.rank, call.number)

@@ -19,11 +19,11 @@ SCENE = """\
 /
 &forces stiffness = 1e6 /
 &integrate dt = 1e-5 duration = 1.2e-2 /
-&output frame_interval = 3e-5 frames_per_segment = 40 log_interval = 1e-3 contacts = .true. /
-&checkpoint steps = 60 /
+&output frame_interval = 1.2e-4 frames_per_segment = 10 log_interval = 1e-3 contacts = .true. /
+&checkpoint steps = 120 /
 """
-#: Frames of the whole run: every third of 1200 steps, and the first
-N_FRAMES = 401
+#: Time between frames [s], of 12 steps; frames of the whole run of 1200 steps, with the first
+INTERVAL, N_FRAMES = 1.2e-4, 101
 
 
 def write_scene(path="scene.nml"):
@@ -84,6 +84,6 @@ def assert_whole(program, folder):
     frames = frames_of(program, folder)
     assert sum(n for n, _, _ in frames) == N_FRAMES, frames
     for n, first, last in frames:
-        assert abs(last - first - 3e-5 * (n - 1)) < 1e-9, (n, first, last)
+        assert abs(last - first - INTERVAL * (n - 1)) < 1e-9, (n, first, last)
     for (_, _, last), (_, first, _) in zip(frames, frames[1:]):
-        assert abs(first - last - 3e-5) < 1e-9, (last, first)
+        assert abs(first - last - INTERVAL) < 1e-9, (last, first)

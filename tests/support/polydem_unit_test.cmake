@@ -3,7 +3,7 @@
 # The tests of one layer: the program test_LAYER, and in ctest LAYER. Labels are LAYER, its group (the first folder below
 # tests), and unit if LAYER is a layer of src. Built with an installed pFUnit if CMake finds one, else with the stand-in
 # of this folder. A test finds files of the repository through the environment variable POLYDEM_SOURCE_DIR, and may
-# write into its working directory, which is empty at the start.
+# write into its working directory, which is empty at the start. Of its two threads the second one mostly sleeps.
 find_package(PFUNIT QUIET)
 
 # pFUnit up to 4.12 ends with code 0 after failures; undefined behaviour does not end a program at all.
@@ -41,8 +41,7 @@ function(polydem_unit_test layer)
     FAIL_REGULAR_EXPRESSION "${polydem_words_of_failure}"
     ENVIRONMENT "POLYDEM_SOURCE_DIR=${PROJECT_SOURCE_DIR};OMP_NUM_THREADS=2;OMP_WAIT_POLICY=passive"
     WORKING_DIRECTORY "${polydem_scratch}/${layer}"
-    FIXTURES_REQUIRED empty_folders
-    PROCESSORS 2)
+    FIXTURES_REQUIRED empty_folders)
   set_property(GLOBAL APPEND PROPERTY polydem_test_folders "${polydem_scratch}/${layer}")
 endfunction()
 

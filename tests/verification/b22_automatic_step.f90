@@ -59,7 +59,7 @@ contains
             do d = 1, size(dampings)
                do f = 1, size(frictions)
                   do p = 1, size(partners)
-                     if (.not. thorough .and. mod(n + 3*l + 5*d + 7*f + 2*p, 10) /= 0) cycle
+                     if (.not. thorough .and. mod(n + 3*l + 5*d + 7*f + 2*p, 20) /= 0) cycle
                      do k = 1, n_turns
                         call compare(table, corners(n), 'law = '''//trim(laws(l))//''' '//trim(dampings(d))// &
                                      ' friction = '''//trim(frictions(f))//'''', partners(p), k, difference)

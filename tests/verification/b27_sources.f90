@@ -86,13 +86,14 @@ contains
       corners = reshape([x - 1.0_wp, -1.0_wp, x + 1.0_wp, -1.0_wp, x + 1.0_wp, 1.0_wp, x - 1.0_wp, 1.0_wp], [2, 4])
    end function square
 
-   !> A hopper whose grains come back, with two fillings
+   !> A hopper whose grains come back, with one or two fillings
    subroutine flow(table, thorough)
       type(table_t), intent(inout) :: table
       logical, intent(in) :: thorough
       real(wp) :: rate(2)
 
       call measure(table, thorough, 300, rate(1))
+      if (.not. thorough) return
       call measure(table, thorough, 450, rate(2))
       call table%expect_relative('rate with 450 grains over that with 300', 1.0_wp, rate(2)/rate(1), 0.1_wp)
    end subroutine flow
