@@ -301,7 +301,7 @@ contains
          vertices(:, k) = [cos(angle)*vertices(1, k) + sin(angle)*vertices(2, k), &
                            cos(angle)*vertices(2, k) - sin(angle)*vertices(1, k)]
       end do
-      call list%append(vertices, mass=mass, inertia=inertia, piece=piece)
+      call list%append(vertices, masses=[mass, inertia], piece=piece)
       call begin('&forces restitution = 0.5 friction_coefficient = 1 stiffness = '//to_text(stiff)//' gravity = 0, '// &
                  to_text(-gravity)//' / &integrate duration = 1 /', list, simulation, error)
       if (allocated(error)) call table%note_error(error)
