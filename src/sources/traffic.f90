@@ -3,19 +3,16 @@
 !> What happens depends on the step, the bodies and the state here alone, which a checkpoint contains, so a restart
 !> decides alike. The step of a departure is the first one without the body.
 module polydem_traffic
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: input_error, raise
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_named_values, only: named_values_t
-   use polydem_outline_file, only: read_outlines
-   use polydem_pair_parameters, only: density_of, material_number
    use polydem_serializer, only: serializer_t
    use polydem_series, only: series_t
-   use polydem_settings, only: settings_t, sink_settings_t
-   use polydem_source, only: new_source, source_t
-   use polydem_source_locations, only: place_of
+   use polydem_settings, only: sink_settings_t
+   use polydem_source, only: source_t
    implicit none
    private
-   public :: traffic_t, sink_t, departure_t, new_traffic, is_due, number_of_values
+   public :: traffic_t, sink_t, departure_t, set_departure, is_due, number_of_values
 
    !> Number of values of a body that leaves: mass, velocity and place
    integer, parameter :: number_of_values = 5
@@ -62,55 +59,6 @@ module polydem_traffic
    end type traffic_t
 
 contains
-
-   !> Start the sources and sinks of a run. Nothing is allocated if there are none.
-   subroutine new_traffic(settings, traffic, error)
-      type(settings_t), intent(in) :: settings
-      type(traffic_t), allocatable, intent(out) :: traffic
-      !> Names the source whose outlines cannot be read
-      type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: k, seed
-
-      if (size(settings%source) + size(settings%sink) == 0) return
-      allocate (traffic)
-      allocate (traffic%sources(size(settings%source)), traffic%sinks(size(settings%sink)))
-      traffic%departures%name = 'departures'
-      call set_departure(traffic%departures%row, 0_lp, 0_lp, [real(wp) :: 0, 0, 0, 0, 0])
-      do k = 1_ip, size(traffic%sources, kind=ip)
-         associate (given => settings%source(k))
-            seed = given%seed
-            if (seed == 0_ip) seed = modulo(settings%scene%seed + 1001_ip*k, huge(1_ip))
-            call new_source(given, seed, traffic%sources(k))
-            if (given%outlines /= '') call read_outlines(given%outlines, traffic%sources(k)%settings%outline, &
-                                                         traffic%sources(k)%settings%outline_corners, error)
-            if (allocated(error)) error%message = place_of(settings, 'source.'//given%name, 'outlines')// &
-               ': &source '//given%name//': outlines: '//error%message
-            if (allocated(error)) return
-            traffic%sources(k)%stage = stage_number(settings, given%stage)
-            traffic%sources(k)%material = material_number(settings, given%material)
-            if (given%material == '') traffic%sources(k)%material = material_number(settings, settings%scene%material)
-            traffic%sources(k)%density = given%density
-            if (.not. given%density > 0.0_wp) &
-               traffic%sources(k)%density = density_of(settings, traffic%sources(k)%material)
-         end associate
-      end do
-      do k = 1_ip, size(traffic%sinks, kind=ip)
-         traffic%sinks(k)%settings = settings%sink(k)
-         traffic%sinks(k)%stage = stage_number(settings, settings%sink(k)%stage)
-      end do
-   end subroutine new_traffic
-
-   !> Number of a stage; 0 without a name
-   pure integer(ip) function stage_number(settings, name) result(number)
-      type(settings_t), intent(in) :: settings
-      character(len=*), intent(in) :: name
-      integer(ip) :: k
-
-      number = 0_ip
-      do k = 1_ip, size(settings%stage, kind=ip)
-         if (name /= '' .and. settings%stage(k)%name == name) number = k
-      end do
-   end function stage_number
 
    !> Whether bodies may enter or leave at an interval and in a stage
    elemental logical function is_due(interval, stage, step, present_stage)

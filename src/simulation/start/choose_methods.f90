@@ -9,7 +9,7 @@ module polydem_choose_methods
    use polydem_pair_parameters, only: pair_parameters
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_traffic, only: new_traffic
+   use polydem_new_traffic, only: new_traffic
    implicit none
    private
    public :: choose_methods
