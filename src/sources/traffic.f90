@@ -121,6 +121,7 @@ contains
 
    !> Set the columns of a departure.
    subroutine set_departure(row, sink, id, value)
+      !> Names and values of the columns
       type(named_values_t), intent(inout) :: row
       !> Number of the sink, and identifier of the body
       integer(lp), intent(in) :: sink, id
