@@ -71,7 +71,10 @@ contains
       class(finder_t), allocatable :: unused
       type(finder_statistics_t) :: statistics
 
-      if (allocated(self%finder)) statistics = self%finder%work
+      if (allocated(self%finder)) then
+         statistics = self%finder%work
+         call self%finder%release()
+      end if
       call move_alloc(self%unused, unused)
       call start_neighbours(self, unused, boxes)
       self%finder%work%value = statistics%value
@@ -98,6 +101,7 @@ contains
 
       call self%finder%work%start()
       if (boxes%n /= self%n_boxes .or. boxes%n_pieces /= self%n_pieces) then
+         call self%finder%release()
          deallocate (self%finder)
          allocate (self%finder, source=self%unused)
          call self%finder%work%start()
@@ -136,6 +140,7 @@ contains
       !> Boxes of the last step
       type(boxes_t), intent(in) :: boxes
 
+      call self%finder%release()
       deallocate (self%unused, self%finder)
       allocate (self%unused, source=finder)
       allocate (self%finder, source=finder)

@@ -30,6 +30,8 @@ module polydem_finder
       procedure(find), deferred :: find
       !> Set the counts that describe the present state
       procedure(survey), deferred :: survey
+      !> Free what the compiler does not free when a finder is deallocated
+      procedure :: release
    end type finder_t
 
    abstract interface
@@ -50,5 +52,15 @@ module polydem_finder
          class(finder_t), intent(inout) :: self
       end subroutine survey
    end interface
+
+contains
+
+   !> Most finders have nothing to free.
+   subroutine release(self)
+      class(finder_t), intent(inout) :: self
+
+      associate (unused => self)
+      end associate
+   end subroutine release
 
 end module polydem_finder

@@ -18,17 +18,9 @@ module polydem_index_list
       procedure :: append
       procedure :: reserve
       procedure :: sort
-      final :: free
    end type index_list_t
 
 contains
-
-   !> Free the entries. gfortran 12 frees those of some components only, where a polymorphic object has several lists.
-   pure subroutine free(self)
-      type(index_list_t), intent(inout) :: self
-
-      if (allocated(self%at)) deallocate (self%at)
-   end subroutine free
 
    !> Make room for n entries.
    pure subroutine reserve(self, n)

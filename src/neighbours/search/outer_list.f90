@@ -24,7 +24,7 @@ module polydem_outer_list
    use polydem_thread_changes, only: part
    implicit none
    private
-   public :: outer_list_t
+   public :: outer_list_t, free_list
 
    !> Costs in units of a comparison of two boxes (measured): a search for all boxes, per box and per candidate; a
    !> search for a single box without its comparisons
@@ -82,6 +82,14 @@ module polydem_outer_list
    end type outer_list_t
 
 contains
+
+   !> Free the memory of a list. gfortran 12 frees a part of it only where a polymorphic object that has the list is
+   !> deallocated.
+   pure subroutine free_list(list)
+      type(outer_list_t), intent(out) :: list
+
+      list%n = 0_ip
+   end subroutine free_list
 
    !> Choose margin and grids, and make an empty list; no box is inside its fat box.
    subroutine prepare(self, boxes)

@@ -13,7 +13,7 @@
 module polydem_two_level
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: lies_inside
-   use polydem_outer_list, only: outer_list_t
+   use polydem_outer_list, only: free_list, outer_list_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_passes, &
       count_rebuilds, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
@@ -39,9 +39,17 @@ module polydem_two_level
    contains
       procedure :: find
       procedure :: survey
+      procedure :: release
    end type two_level_t
 
 contains
+
+   !> Free the candidates.
+   subroutine release(self)
+      class(two_level_t), intent(inout) :: self
+
+      call free_list(self%list)
+   end subroutine release
 
    !> Compare the active candidates; before that, begin an interval or take care of the boxes off their lines.
    subroutine find(self, boxes, changes)
