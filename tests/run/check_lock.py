@@ -172,10 +172,29 @@ def no_other_program_gets_the_descriptor(case, _):
         end(process)
 
 
+def what_a_run_leaves_that_dies_in_its_last_checkpoint_goes(case, _):
+    case.finish("ended")
+    left = [os.path.join("ended", name) for name in ("running.lock", "checkpoint_1.h5.unfinished")]
+    mine = os.path.join("ended", "mine.unfinished")
+    for path in (left[1], mine):
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("begun")
+    # The run may still live on another machine.
+    write("ended", words_of(1, "elsewhere", "another"))
+    code, _, message = case.run("ended", "--continue")
+    assert code == BAD_INPUT and all(map(os.path.exists, left)), (code, message)
+    with open("/proc/sys/kernel/random/boot_id", encoding="utf-8") as file:
+        write("ended", words_of(1, os.uname().nodename, file.read().strip()))
+    code, output, message = case.run("ended", "--continue")
+    assert code == 0 and "nothing to do" in output and not any(map(os.path.exists, left)), (output, message)
+    assert os.path.exists(mine)
+
+
 TESTS = (a_living_run_keeps_others_out_also_when_it_stands_still, a_killed_run_keeps_nobody_out,
          a_process_number_that_another_one_has_now_keeps_nobody_out, processes_of_other_namespaces_keep_each_other_out,
          a_lock_of_another_machine_keeps_runs_out_until_it_is_removed,
-         where_nothing_can_be_locked_a_lock_stays_until_it_is_removed, no_other_program_gets_the_descriptor)
+         where_nothing_can_be_locked_a_lock_stays_until_it_is_removed, no_other_program_gets_the_descriptor,
+         what_a_run_leaves_that_dies_in_its_last_checkpoint_goes)
 
 
 if __name__ == "__main__":

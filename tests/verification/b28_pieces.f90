@@ -95,7 +95,7 @@ contains
       call load_on(table, law, n, columns, tilt, tilted)
       call table%expect_relative(name//': stiffness against tilts, over the whole', &
                                  press_force(law, n, columns)/press_force(law, 1, columns), &
-                                 tilted(3)/tilted_whole(3), 0.01_wp)
+                                 tilted(3)/tilted_whole(3), 0.005_wp)
    end subroutine press
 
    !> Force of the elastic law on a block of n pieces at the depth: the sum over rectangles [N/m]
@@ -180,7 +180,7 @@ contains
          weight = bodies%mass(2)*gravity
          s = sqrt(thick*head)
          call table%expect_relative('key in a lock: depth of its head in the lips [m]', &
-                                    weight*s(1)**2/(2.0_wp*stiffness*(0.5_wp*(head - slot))**2), sunk, 1.0e-4_wp)
+                                    weight*s(1)**2/(2.0_wp*stiffness*(0.5_wp*(head - slot))**2), sunk, 1.0e-6_wp)
          call table%expect_absolute('key in a lock: speed at rest [m/s]', 0.0_wp, norm2(bodies%velocity(:, 2)), &
                                     1.0e-9_wp)
       end associate
