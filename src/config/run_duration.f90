@@ -1,10 +1,10 @@
-!> The duration of a run: given, or the sum of the longest durations of its stages.
+!> The duration of a run: given, or the sum of the longest durations of its stages; and the numbers of these.
 module polydem_run_duration
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: settings_t, stage_settings_t
    implicit none
    private
-   public :: longest_run, longest_stage
+   public :: longest_run, longest_stage, number_of_stage
 
 contains
 
@@ -28,5 +28,18 @@ contains
       duration = stage%longest
       if (stage%until == 'duration') duration = stage%duration
    end function longest_stage
+
+   !> Number of the stage with a name; 0 without a name
+   pure integer(ip) function number_of_stage(settings, name) result(number)
+      type(settings_t), intent(in) :: settings
+      !> Its name, or an empty text
+      character(len=*), intent(in) :: name
+      integer(ip) :: k
+
+      number = 0_ip
+      do k = 1_ip, size(settings%stage, kind=ip)
+         if (name /= '' .and. settings%stage(k)%name == name) number = k
+      end do
+   end function number_of_stage
 
 end module polydem_run_duration

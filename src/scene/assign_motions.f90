@@ -4,9 +4,10 @@ module polydem_assign_motions
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion_file, only: read_motion_table
-   use polydem_name_walls, only: ids_of_wall, number_of_stage
+   use polydem_name_walls, only: ids_of_wall
    use polydem_outlines, only: pi
    use polydem_prescribed_motion, only: motion_t
+   use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text

@@ -3,6 +3,7 @@ module polydem_name_walls
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: ip, wp
    use polydem_named_walls, only: named_walls_t
+   use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: settings_t
    use polydem_strings, only: index_of
    use polydem_wall, only: wall_t
@@ -10,7 +11,7 @@ module polydem_name_walls
    use polydem_wall_load, only: along_angle, wall_load_t
    implicit none
    private
-   public :: assign_loads, ids_of_wall, name_walls, number_of_stage
+   public :: assign_loads, ids_of_wall, name_walls
 
 contains
 
@@ -112,18 +113,5 @@ contains
          end associate
       end do
    end subroutine assign_loads
-
-   !> Number of the stage with a name; 0 without a name
-   pure integer(ip) function number_of_stage(settings, name) result(number)
-      type(settings_t), intent(in) :: settings
-      !> Its name, or an empty text
-      character(len=*), intent(in) :: name
-      integer(ip) :: k
-
-      number = 0_ip
-      do k = 1_ip, size(settings%stage, kind=ip)
-         if (name /= '' .and. settings%stage(k)%name == name) number = k
-      end do
-   end function number_of_stage
 
 end module polydem_name_walls

@@ -4,6 +4,7 @@ module polydem_new_traffic
    use polydem_kinds, only: ip, lp, wp
    use polydem_outline_file, only: read_outlines
    use polydem_pair_parameters, only: density_of, material_number
+   use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: settings_t
    use polydem_source, only: new_source
    use polydem_source_locations, only: place_of
@@ -37,7 +38,7 @@ contains
             if (allocated(error)) error%message = place_of(settings, 'source.'//given%name, 'outlines')// &
                ': &source '//given%name//': outlines: '//error%message
             if (allocated(error)) return
-            traffic%sources(k)%stage = stage_number(settings, given%stage)
+            traffic%sources(k)%stage = number_of_stage(settings, given%stage)
             traffic%sources(k)%material = material_number(settings, given%material)
             if (given%material == '') traffic%sources(k)%material = material_number(settings, settings%scene%material)
             traffic%sources(k)%density = given%density
@@ -47,20 +48,8 @@ contains
       end do
       do k = 1_ip, size(traffic%sinks, kind=ip)
          traffic%sinks(k)%settings = settings%sink(k)
-         traffic%sinks(k)%stage = stage_number(settings, settings%sink(k)%stage)
+         traffic%sinks(k)%stage = number_of_stage(settings, settings%sink(k)%stage)
       end do
    end subroutine new_traffic
-
-   !> Number of a stage; 0 without a name
-   pure integer(ip) function stage_number(settings, name) result(number)
-      type(settings_t), intent(in) :: settings
-      character(len=*), intent(in) :: name
-      integer(ip) :: k
-
-      number = 0_ip
-      do k = 1_ip, size(settings%stage, kind=ip)
-         if (name /= '' .and. settings%stage(k)%name == name) number = k
-      end do
-   end function stage_number
 
 end module polydem_new_traffic
