@@ -1,6 +1,6 @@
 !> Active candidates: those that are compared in every step of an interval (`polydem_inner_list`).
 module polydem_active_pairs
-   use polydem_candidates, only: candidates_t
+   use polydem_candidates, only: candidates_t, compared_pairs_t
    use polydem_grow, only: grow
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip
@@ -9,7 +9,7 @@ module polydem_active_pairs
    public :: active_pairs_t
 
    !> Active candidates
-   type, extends(candidates_t) :: active_pairs_t
+   type, extends(compared_pairs_t) :: active_pairs_t
       !> Number of each active candidate in the list of all candidates, (active candidate)
       integer(ip), allocatable :: owner(:)
       !> Place of each candidate among the active ones, 0 if it is not active, (candidate)

@@ -31,7 +31,7 @@ module polydem_candidate_rows
       !> 1 if a box was outside its padded box when the states were last updated, else 0, (box)
       integer(bp), allocatable, private :: outside(:)
    contains
-      procedure :: start => start_rows
+      procedure :: start
       procedure :: update_states
       procedure :: replace
       procedure :: append
@@ -44,7 +44,7 @@ module polydem_candidate_rows
 contains
 
    !> Make empty rows.
-   pure subroutine start_rows(self, n_boxes)
+   pure subroutine start(self, n_boxes)
       class(candidate_rows_t), intent(inout) :: self
       !> Number of boxes
       integer(ip), intent(in) :: n_boxes
@@ -54,7 +54,7 @@ contains
       allocate (self%row(2, n_boxes), source=0_ip)
       allocate (self%first_of_second(n_boxes + 2_ip), source=1_ip)
       allocate (self%outside(n_boxes))
-   end subroutine start_rows
+   end subroutine start
 
    !> Compare all candidates before they are replaced, and find the boxes outside their padded boxes.
    subroutine update_states(self, boxes, padded, changes)

@@ -3,15 +3,15 @@
 !> Candidates can be added and removed in every step. New ones are compared until the next interval.
 module polydem_filtered_candidates
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t
    use polydem_kinds, only: ip, wp
+   use polydem_linked_candidates, only: linked_candidates_t
    use polydem_parallel_filter, only: parallel_filter_t
    implicit none
    private
    public :: filtered_candidates_t
 
    !> Candidates, and the filter of their comparisons
-   type, extends(candidates_t) :: filtered_candidates_t
+   type, extends(linked_candidates_t) :: filtered_candidates_t
       !> Whether there is a filter
       logical :: filtered = .false.
       !> Lines, intervals and active candidates
@@ -58,7 +58,7 @@ contains
       !> Its number
       integer(ip), intent(out) :: k
 
-      call self%candidates_t%add(a, b, overlap, k)
+      call self%linked_candidates_t%add(a, b, overlap, k)
       if (self%filtered) call self%filter%active%activate(k, self)
    end subroutine add
 
@@ -69,7 +69,7 @@ contains
       integer(ip), intent(in) :: k
 
       if (self%filtered) call self%filter%active%forget(k)
-      call self%candidates_t%drop(k)
+      call self%linked_candidates_t%drop(k)
    end subroutine drop
 
    !> Whether an interval must begin before the active candidates of this step are compared

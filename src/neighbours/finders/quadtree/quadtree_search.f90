@@ -5,9 +5,10 @@
 !> others are only compared. The candidates can be replaced later, before the next comparison.
 module polydem_quadtree_search
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, meet, overlapping
+   use polydem_candidates, only: overlapping
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, wp
+   use polydem_linked_candidates, only: linked_candidates_t, meet
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t
    implicit none
@@ -190,7 +191,7 @@ contains
       class(replacement_t), intent(inout) :: self
       !> Padded cells. Those of `now` are not used, and may change meanwhile
       type(padded_cells_t), intent(in) :: padded
-      class(candidates_t), intent(inout) :: candidates
+      class(linked_candidates_t), intent(inout) :: candidates
       integer(ip) :: k, number
 
       self%separated%n = 0_ip
