@@ -156,8 +156,8 @@ contains
          end do
          if (allocated(error)) return
          case%mode = 'live'
-         case%boxes = simulation%boxes%n
-         case%fixed = count(simulation%boxes%fixed(:case%boxes), kind=ip)
+         case%boxes = simulation%search%boxes%n
+         case%fixed = count(simulation%search%boxes%fixed(:case%boxes), kind=ip)
          case%bodies = simulation%bodies%n
          case%dt = real(simulation%dt, dp)
          case%input = scene%settings%resolved

@@ -50,19 +50,19 @@ contains
       call new_finder_or_variant(finder, sample%case%finder, error)
       if (allocated(error)) return
       finder%isa = simulation%bodies%isa
-      call simulation%neighbours%change_finder(finder, simulation%boxes)
-      simulation%neighbours%finder%work%thorough = checked
+      call simulation%search%neighbours%change_finder(finder, simulation%search%boxes)
+      simulation%search%neighbours%finder%work%thorough = checked
       call begin_sample(sample%case%steps, checked, clock, sample)
       allocate (sample%stage(n_stages, sample%case%steps))
-      call meter%read_seconds(simulation%neighbours%finder, sample%phase(:, 1))
-      if (checked) call meter%read_all(simulation%neighbours%finder, sample%phase(:, 1), sample%count(:, 1))
+      call meter%read_seconds(simulation%search%neighbours%finder, sample%phase(:, 1))
+      if (checked) call meter%read_all(simulation%search%neighbours%finder, sample%phase(:, 1), sample%count(:, 1))
       do s = 1_ip, sample%case%steps
          call time_step(clock, simulation, s, sample, error)
          if (allocated(error)) return
          if (present(by_oracle)) then
-            if (by_oracle(s)) call set_by_all_pairs(reference, s, simulation%boxes, oracle, error)
+            if (by_oracle(s)) call set_by_all_pairs(reference, s, simulation%search%boxes, oracle, error)
          end if
-         call check_step(simulation%neighbours, s, checked, meter, reference, sample, error)
+         call check_step(simulation%search%neighbours, s, checked, meter, reference, sample, error)
          if (allocated(error)) return
       end do
       reference%finish = state_hash(simulation%bodies)

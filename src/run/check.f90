@@ -71,7 +71,7 @@ contains
       call new_monitor(monitor, simulation)
       call warn_of_risks(simulation, measures, log, monitor%at_start)
       ! A body that is too fast at the start moves too far in the first step.
-      call check_motion(simulation%motion_check, simulation%bodies, simulation%moving(:simulation%n_moving), &
+      call check_motion(simulation%motion%check, simulation%bodies, simulation%moving(:simulation%n_moving), &
                         simulation%step, simulation%dt, error)
       call check_step(monitor, simulation, .true., log, error)
    end subroutine warn_at_start

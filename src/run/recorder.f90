@@ -60,7 +60,7 @@ contains
       type(manifest_t), intent(inout) :: manifest
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (output => simulation%settings%output, boxes => simulation%boxes)
+      associate (output => simulation%settings%output, boxes => simulation%search%boxes)
          self%trace_steps = output%trace_steps
          self%first_step = first_trace_step(output%trace_start, simulation%dt)
          if (self%trace_steps > 0_ip .and. simulation%step <= self%first_step) then
@@ -76,7 +76,7 @@ contains
             if (allocated(error)) return
             call self%steps%open(folder//'/'//steps_name, stage_names, phase_names, count_names, provenance, error)
             allocate (self%row%stage(n_stages), self%row%phase(n_phases), self%row%count(n_counts))
-            call self%meter%read_all(simulation%neighbours%finder, self%row%phase, self%row%count)
+            call self%meter%read_all(simulation%search%neighbours%finder, self%row%phase, self%row%count)
          end if
       end associate
       if (.not. allocated(error)) call record_boxes(self, simulation, manifest, error)
@@ -120,9 +120,9 @@ contains
          row%step = simulation%step
          row%stage = simulation%timers%total - self%stage_seconds
          self%stage_seconds = simulation%timers%total
-         call self%meter%read_all(simulation%neighbours%finder, row%phase, row%count)
-         row%pairs = simulation%neighbours%pairs%n
-         row%contacts = simulation%n_contacts
+         call self%meter%read_all(simulation%search%neighbours%finder, row%phase, row%count)
+         row%pairs = simulation%search%neighbours%pairs%n
+         row%contacts = simulation%loop%n_contacts
       end associate
       call self%steps%add(self%row, error)
    end subroutine record
@@ -164,7 +164,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (.not. self%trace%is_open .or. simulation%step < self%first_step) return
-      associate (boxes => simulation%boxes, pairs => simulation%neighbours%pairs)
+      associate (boxes => simulation%search%boxes, pairs => simulation%search%neighbours%pairs)
          call self%trace%add(simulation%step, boxes%bounds(:, :boxes%n), pairs%n, list_hash(pairs), error)
       end associate
       if (self%trace%n_steps < self%trace_steps) return

@@ -34,7 +34,7 @@ contains
          if (s%stages%number > 0_ip) call measure_condition(s)
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then
-            call count_contacts(s%comm, s%n_contacts, n_contacts)
+            call count_contacts(s%comm, s%loop%n_contacts, n_contacts)
             if (s%settings%output%energy_balance) then
                call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, n_contacts, &
                                            [run%balance%kinetic, run%balance%potential])

@@ -1,12 +1,11 @@
 !> Builds the scene and the simulation of a run. All ranks build alike.
 module polydem_start
    use omp_lib, only: omp_get_thread_limit, omp_set_num_threads
-   use polydem_assign_motions, only: assign_motions
+   use polydem_assign_walls, only: assign_walls
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_law_factory, only: check_law
-   use polydem_name_walls, only: assign_loads, name_walls
    use polydem_process_limits, only: check_threads
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
@@ -44,11 +43,9 @@ contains
       if (allocated(error)) return
       if (settings%scene%name == 'result') then
          call read_start(settings, ranks, self%bodies, of_result, error)
-         if (.not. allocated(error)) call assign_motions(settings, self%bodies, of_result, self%walls, error)
-         if (.not. allocated(error)) call name_walls(settings, self%bodies, of_result, self%walls, self%named)
-         if (.not. allocated(error)) call assign_loads(settings, of_result, self%loads)
+         if (.not. allocated(error)) call assign_walls(settings, self%bodies, of_result, self%walls, error)
       else
-         call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size, self%named, self%loads)
+         call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size)
       end if
       call ranks%all_reduce_error(error)
       if (present(threads) .and. .not. allocated(error)) &

@@ -3,15 +3,13 @@
 !> A scene consists of parts, walls and groups of grains: those of the namelist, or those that a recipe makes. This
 !> module makes the bodies from them.
 module polydem_scene
-   use polydem_assign_motions, only: assign_motions
+   use polydem_assign_walls, only: assign_walls
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_gas, only: explain_gas
    use polydem_kinds, only: ip, wp
    use polydem_list_file, only: list_file, origin_of_file
-   use polydem_name_walls, only: assign_loads, name_walls
-   use polydem_named_walls, only: named_walls_t
    use polydem_parts, only: parts_t
    use polydem_place_parts, only: list_parts
    use polydem_polygon_list, only: polygon_list_t
@@ -19,10 +17,9 @@ module polydem_scene
    use polydem_settings, only: settings_t
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_strings, only: to_text
-   use polydem_wall, only: wall_t
    use polydem_wall_bodies, only: wall_bodies_t
-   use polydem_wall_load, only: wall_load_t
    use polydem_wall_outlines, only: is_anticlockwise
+   use polydem_walls, only: walls_t
    implicit none
    private
    public :: build_scene
@@ -36,22 +33,18 @@ module polydem_scene
 contains
 
    !> Make the bodies of a scene and its moving walls.
-   subroutine build_scene(settings, bodies, walls, error, rank, n_ranks, named, loads)
+   subroutine build_scene(settings, bodies, walls, error, rank, n_ranks)
       !> Settings: groups &scene, &motion and &forces (gravity and stiffness, for blocks at rest)
       type(settings_t), intent(in) :: settings
       !> Bodies at the start; free bodies come first unless a bodies file has another order
       type(bodies_t), intent(out) :: bodies
-      !> Fixed bodies with prescribed motions or loads; each wall has bodies with the same motions and loads
-      type(wall_t), allocatable, intent(out) :: walls(:)
+      !> Walls with their names, motions and loads
+      type(walls_t), intent(out) :: walls
       !> Error in the namelist or the bodies file
       type(error_t), allocatable, intent(inout) :: error
       !> Number of this rank, from 0, and number of ranks; each rank makes all fixed bodies and its share of the free
       !> bodies. Default: one rank
       integer(ip), intent(in), optional :: rank, n_ranks
-      !> Walls with their names
-      type(named_walls_t), intent(inout), optional :: named
-      !> Loads on them; not allocated if there are none
-      type(wall_load_t), allocatable, intent(inout), optional :: loads(:)
       type(body_list_t) :: list
       type(parts_t) :: parts
       type(wall_bodies_t), allocatable :: walls_of_parts(:)
@@ -71,10 +64,7 @@ contains
          if (allocated(error) .and. parts%recipe == '') error%message = error%message// &
             overrides_of(settings, 'grains')//overrides_of(settings, 'wall')
       end if
-      if (.not. allocated(error)) call assign_motions(settings, bodies, walls_of_parts, walls, error)
-      if (allocated(error)) return
-      if (present(named)) call name_walls(settings, bodies, walls_of_parts, walls, named)
-      if (present(loads)) call assign_loads(settings, walls_of_parts, loads)
+      if (.not. allocated(error)) call assign_walls(settings, bodies, walls_of_parts, walls, error)
    end subroutine build_scene
 
    !> Beginning of a message about one of all bodies

@@ -77,18 +77,20 @@ contains
 
       call self%law%scale_friction(self%stages%friction_scale)
       call self%body_forces%configure(self%settings%forces)
-      call self%flight%start(self%settings%forces%gravity, self%body_forces%act() .or. &
-                             self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
-      do j = 1, size(self%walls)
-         do k = 1, size(self%walls(j)%motions)
-            associate (motion => self%walls(j)%motions(k), stages => self%stages)
+      call self%motion%flight%start(self%settings%forces%gravity, self%body_forces%act() .or. &
+                             self%bodies%pieces%most > 1_ip, self%motion%integrator, self%bodies%n)
+      do j = 1, size(self%walls%driven)
+         do k = 1, size(self%walls%driven(j)%motions)
+            associate (motion => self%walls%driven(j)%motions(k), stages => self%stages)
                call set_window(stages, self%dt, motion%stage, motion%start, motion%end)
             end associate
          end do
       end do
-      if (.not. allocated(self%loads)) return
-      do k = 1, size(self%loads)
-         call set_window(self%stages, self%dt, self%loads(k)%stage, self%loads(k)%start, self%loads(k)%end)
+      if (.not. allocated(self%walls%loads)) return
+      do k = 1, size(self%walls%loads)
+         associate (load => self%walls%loads(k))
+            call set_window(self%stages, self%dt, load%stage, load%start, load%end)
+         end associate
       end do
    end subroutine use_parameters
 
@@ -179,9 +181,9 @@ contains
          integer :: j, k
 
          centre = 0.0_wp
-         do k = 1, size(self%named%wall)
-            if (self%named%wall(k)%name /= name) cycle
-            associate (id => self%named%wall(k)%id)
+         do k = 1, size(self%walls%named%wall)
+            if (self%walls%named%wall(k)%name /= name) cycle
+            associate (id => self%walls%named%wall(k)%id)
                do j = 1, size(id)
                   centre = centre + path_of(self%bodies, place_in(self%bodies%id, id(j)))/real(size(id), wp)
                end do

@@ -48,7 +48,7 @@ contains
 
       if (allocated(error)) return
       self%loop%has_table = tabulate
-      associate (pairs => self%neighbours%pairs)
+      associate (pairs => self%search%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
          call divide_pairs(pairs%n, pairs%first, self%bodies%pieces, n, self%loop%upto, ends)
          call reserve_ranges(n, self%loop)
@@ -58,9 +58,9 @@ contains
          end do
          last(n) = self%bodies%n
       end associate
-      call begin_sums(self%bodies%n, self%force_sums)
+      call begin_sums(self%bodies%n, self%loop%force_sums)
       if (self%law%needs_shares) &
-         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%loop%shares)
+         call find_shares(self%law, self%bodies, self%search%neighbours%pairs, self%history, self%loop%shares)
       !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n, clock) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
@@ -70,7 +70,7 @@ contains
       !$omp do schedule(static, 1)
       do k = 1_ip, n
          do r = n - 1_ip, 1_ip, -1_ip
-            call add_late_terms(self%loop%ranges(r)%late, k, n, self%force_sums)
+            call add_late_terms(self%loop%ranges(r)%late, k, n, self%loop%force_sums)
          end do
          if (k == n) call join_walls(self%loop%walls_of(:n), self%loop%walls)
       end do
@@ -80,8 +80,8 @@ contains
       call balance_ranges(self%loop%elapsed(:n), self%loop%upto)
       call gather_results(n, .not. allocated(self%law%constraint), self%loop, self%contacts)
       associate (ranges => self%loop%ranges(:n))
-         self%n_contacts = sum(ranges%n_contacts)
-         self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
+         self%loop%n_contacts = sum(ranges%n_contacts)
+         self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%loop%n_contacts, lp)
          self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(sum(ranges%n_degenerate), lp)
       end associate
       if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%loop%incidence)
@@ -128,7 +128,7 @@ contains
          cursor = count(self%loop%shares%pair(:self%loop%shares%n) <= ends(2), kind=ip)
       do while (next > ends(1))
          call own_clock%begin_block()
-         associate (pairs => self%neighbours%pairs)
+         associate (pairs => self%search%neighbours%pairs)
             call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, &
                             ends(1) + 1_ip, next, tested, self%history, block)
          end associate
@@ -139,15 +139,15 @@ contains
          ! Sums begin just before their first terms: no contact so far had a lower slot.
          if (block%n > 0_ip) then
             low = min(block%first(block%n), block%second(block%n))
-            call clear_sums(low, high, self%force_sums)
+            call clear_sums(low, high, self%loop%force_sums)
             high = min(high, low - 1_ip)
          end if
-         call add_terms(block, terms, last(2), self%force_sums, self%loop%ranges(r)%late)
+         call add_terms(block, terms, last(2), self%loop%force_sums, self%loop%ranges(r)%late)
          call count_block(self%domain%has_halo(), self%bodies, block, self%loop%ranges(r))
          call keep_contacts(r, self%bodies, block, terms, self%history, self%loop)
          call own_clock%end_part(2)
       end do
-      call clear_sums(last(1) + 1_ip, high, self%force_sums)
+      call clear_sums(last(1) + 1_ip, high, self%loop%force_sums)
       if (r == 1_ip) clock = own_clock
       self%loop%elapsed(r) = max(wall_seconds() - began, tiny(began))
    end subroutine loop_over_range

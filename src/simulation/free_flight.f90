@@ -6,12 +6,12 @@
 module polydem_free_flight
    use polydem_bodies, only: block_size, bodies_t, turn_bodies
    use polydem_body_runs, only: find_run, list_others
-   use polydem_box_maker, only: box_maker_t, turn_and_bound_block, turn_and_bound_in_cell
-   use polydem_boxes, only: boxes_t
+   use polydem_box_maker, only: turn_and_bound_block, turn_and_bound_in_cell
    use polydem_extreme_corners, only: bound_block, extreme_corners_t, forget_corners
    use polydem_motion_check, only: find_coasting, motion_check_t
    use polydem_integrator, only: drift, integrator_t
    use polydem_kinds, only: ip, wp
+   use polydem_neighbour_search, only: neighbour_search_t
    use polydem_pair_list, only: pair_list_t
    implicit none
    private
@@ -143,25 +143,24 @@ contains
 
    !> Update the boxes of up to `block_size` bodies, and turn their vertices as far as they are needed. Several threads
    !> may call it for different bodies.
-   subroutine bound(self, maker, slots, pairs, bodies, boxes)
+   subroutine bound(self, slots, search, bodies)
       class(free_flight_t), intent(inout) :: self
-      type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies, ascending
       integer(ip), intent(in), contiguous :: slots(:)
-      !> Pairs of the last step
-      type(pair_list_t), intent(in) :: pairs
+      !> Pairs of the last step; only the bounds of the boxes change
+      type(neighbour_search_t), intent(inout) :: search
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
-      !> Boxes; only `bounds` changes
-      type(boxes_t), intent(inout) :: boxes
 
-      if (self%is_dilute) then
-         call bound_block(self%corners, maker, slots, pairs%pairs_of, bodies, boxes)
-      else if (bodies%cell%is_periodic) then
-         call turn_and_bound_in_cell(maker, slots, bodies, boxes)
-      else
-         call turn_and_bound_block(maker, slots, bodies, boxes)
-      end if
+      associate (maker => search%maker, boxes => search%boxes)
+         if (self%is_dilute) then
+            call bound_block(self%corners, maker, slots, search%neighbours%pairs%pairs_of, bodies, boxes)
+         else if (bodies%cell%is_periodic) then
+            call turn_and_bound_in_cell(maker, slots, bodies, boxes)
+         else
+            call turn_and_bound_block(maker, slots, bodies, boxes)
+         end if
+      end associate
    end subroutine bound
 
    !> Turn the vertices of the bodies that have pairs since this step; those of other bodies with pairs are turned.

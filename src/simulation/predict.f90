@@ -3,22 +3,23 @@
 !> The pass does all that it can do for a block of bodies while the block is in the cache.
 module polydem_predict
    use polydem_bodies, only: block_size, bodies_t
+   use polydem_body_motion, only: body_motion_t
    use polydem_body_runs, only: find_run, list_others, number_of_parts
-   use polydem_bodies_in_cell, only: put_into_cell, wrap_bodies
+   use polydem_bodies_in_cell, only: wrap_bodies
    use polydem_boxes_within, only: have_boxes_within
+   use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t
    use polydem_errors, only: error_t
+   use polydem_free_flight, only: free_flight_t
    use polydem_motion_check, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
-   use polydem_named_walls, only: named_walls_t
+   use polydem_neighbour_search, only: neighbour_search_t
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part
    use polydem_timers, only: block_clock_t
-   use polydem_wall, only: move_wall, wall_t
-   use polydem_wall_load, only: carry_walls, correct_loads, predict_loads, wall_load_t
    implicit none
    private
-   public :: predict_border, predict_bodies, move_walls, yield_walls
+   public :: predict_border, predict_bodies
 
 contains
 
@@ -36,10 +37,9 @@ contains
       integer(ip) :: k
       logical :: good
 
-      call self%flight%begin_step(self%neighbours%pairs, self%bodies%n)
+      call self%motion%flight%begin_step(self%search%neighbours%pairs, self%bodies%n)
       call predict_and_bound(self, good, has_left, clock)
-      if (allocated(self%loads)) call predict_loads(self%dt, self%loads)
-      call move_walls(self%walls, self%named, time_of(self), self%bodies, self%loads)
+      call self%walls%predict(self%dt, time_of(self), self%bodies)
       do k = size(self%bodies%free, kind=ip) + 1_ip, self%n_moving
          good = good .and. have_valid_poses(self%bodies, self%moving(k), self%moving(k))
       end do
@@ -59,7 +59,7 @@ contains
       do low = 1_ip, n, block_size
          associate (block => self%domain%halo%border(low:min(low + block_size - 1_ip, n)))
             if (self%bodies%cell%is_periodic) call return_to_cell(self%dt, block, self%bodies, self%energy_balance)
-            call self%flight%predict(self%integrator, self%motion_check, self%dt, block, self%bodies)
+            call self%motion%predict(self%dt, block, self%bodies)
          end associate
       end do
       !$omp end parallel do
@@ -110,9 +110,9 @@ contains
       do k = 1_ip, size(slots, kind=ip), block_size
          call own_clock%begin_block()
          associate (block => slots(k:min(k + block_size - 1_ip, size(slots, kind=ip))))
-            call predict_block(self, block, valid)
+            call predict_block(self%dt, self%domain, block, self%motion, self%bodies, self%energy_balance, valid)
             call own_clock%end_part(1)
-            if (valid) call bound_block(self, block, has_left)
+            if (valid) call bound_block(block, self%domain, self%motion%flight, self%search, self%bodies, has_left)
             call own_clock%end_part(2)
          end associate
          good = good .and. valid
@@ -121,29 +121,33 @@ contains
    end subroutine predict_part
 
    !> Predict those of up to `block_size` bodies that are not in the border, and check the poses of all of them.
-   subroutine predict_block(self, slots, valid)
-      type(simulation_t), intent(inout) :: self
+   subroutine predict_block(dt, domain, slots, motion, bodies, balance, valid)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      type(domain_t), intent(in) :: domain
       !> Slots of the bodies, ascending
       integer(ip), intent(in), contiguous :: slots(:)
+      type(body_motion_t), intent(inout) :: motion
+      type(bodies_t), intent(inout) :: bodies
+      !> Balance of energy; not started if the run computes none
+      type(energy_balance_t), intent(inout) :: balance
       !> Whether all have valid poses
       logical, intent(out) :: valid
       integer(ip) :: n, next, first, last, others(block_size)
 
-      if (self%domain%has_halo()) then
-         call list_others(size(slots, kind=ip), slots, self%domain%halo%in_border, n, others)
-         if (self%bodies%cell%is_periodic) &
-            call return_to_cell(self%dt, others(:n), self%bodies, self%energy_balance)
-         call self%flight%predict(self%integrator, self%motion_check, self%dt, others(:n), self%bodies)
+      if (domain%has_halo()) then
+         call list_others(size(slots, kind=ip), slots, domain%halo%in_border, n, others)
+         if (bodies%cell%is_periodic) call return_to_cell(dt, others(:n), bodies, balance)
+         call motion%predict(dt, others(:n), bodies)
       else
-         if (self%bodies%cell%is_periodic) &
-            call return_to_cell(self%dt, slots, self%bodies, self%energy_balance)
-         call self%flight%predict(self%integrator, self%motion_check, self%dt, slots, self%bodies)
+         if (bodies%cell%is_periodic) call return_to_cell(dt, slots, bodies, balance)
+         call motion%predict(dt, slots, bodies)
       end if
       valid = .true.
       next = 1_ip
       do while (next <= size(slots, kind=ip))
          call find_run(slots, size(slots, kind=ip), next, first, last)
-         valid = valid .and. have_valid_poses(self%bodies, first, last)
+         valid = valid .and. have_valid_poses(bodies, first, last)
       end do
    end subroutine predict_block
 
@@ -176,48 +180,22 @@ contains
    end subroutine return_to_cell
 
    !> Turn the vertices of up to `block_size` bodies as far as they are needed, and update their boxes.
-   subroutine bound_block(self, slots, has_left)
-      type(simulation_t), intent(inout) :: self
+   subroutine bound_block(slots, domain, flight, search, bodies, has_left)
       !> Slots of the bodies, ascending
       integer(ip), intent(in), contiguous :: slots(:)
+      type(domain_t), intent(in) :: domain
+      type(free_flight_t), intent(inout) :: flight
+      !> Search; only the bounds of the boxes change
+      type(neighbour_search_t), intent(inout) :: search
+      !> Bodies; only `turned` changes
+      type(bodies_t), intent(inout) :: bodies
       !> Becomes true if a box leaves the zone of this rank and its padded box of the last redistribution
       logical, intent(inout) :: has_left
 
-      call self%flight%bound(self%maker, slots, self%neighbours%pairs, self%bodies, self%boxes)
-      if (.not. allocated(self%domain%reference)) return
-      has_left = has_left .or. .not. have_boxes_within(self%maker, slots, self%boxes, self%domain%rank_bounds%zone, &
-                                                       self%domain%reference)
+      call flight%bound(slots, search, bodies)
+      if (.not. allocated(domain%reference)) return
+      has_left = has_left .or. .not. have_boxes_within(search%maker, slots, search%boxes, domain%rank_bounds%zone, &
+                                                       domain%reference)
    end subroutine bound_block
-
-   !> Move the bodies with prescribed motion to their poses at a given time, and displace them by loads.
-   subroutine move_walls(walls, named, time, bodies, loads)
-      !> Fixed bodies with prescribed motions or loads
-      type(wall_t), intent(in) :: walls(:)
-      !> Walls by name
-      type(named_walls_t), intent(in) :: named
-      !> Simulated time [s]
-      real(wp), intent(in) :: time
-      type(bodies_t), intent(inout) :: bodies
-      !> Loads on named walls; absent or not allocated: none
-      type(wall_load_t), intent(in), optional :: loads(:)
-      integer :: k
-
-      do k = 1, size(walls)
-         call move_wall(walls(k), time, bodies)
-         if (bodies%cell%is_periodic) call put_into_cell(bodies, walls(k)%slots)
-      end do
-      if (present(loads)) call carry_walls(loads, named, bodies)
-   end subroutine move_walls
-
-   !> Find the velocities of the walls that yield to loads from the contacts. Their places do not change. Collective.
-   subroutine yield_walls(self, dt)
-      !> The simulation with loads, and with the contacts of this step
-      type(simulation_t), intent(inout) :: self
-      !> Time step; 0 at the start [s]
-      real(wp), intent(in) :: dt
-
-      call correct_loads(self%loads, self%comm, dt, time_of(self), self%named, self%bodies, self%loop%walls)
-      call move_walls(self%walls, self%named, time_of(self), self%bodies, self%loads)
-   end subroutine yield_walls
 
 end module polydem_predict

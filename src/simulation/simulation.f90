@@ -2,31 +2,23 @@
 module polydem_simulation
    use polydem_bodies, only: bodies_t
    use polydem_body_forces, only: body_forces_t
-   use polydem_box_maker, only: box_maker_t
-   use polydem_boxes, only: boxes_t
+   use polydem_body_motion, only: body_motion_t
    use polydem_communicator, only: communicator_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
-   use polydem_energy_balance, only: energy_balance_t, evaluate_balance, balance_t
+   use polydem_energy_balance, only: balance_t, energy_balance_t, evaluate_balance
    use polydem_force_law, only: force_law_t
-   use polydem_force_sums, only: force_sums_t
-   use polydem_free_flight, only: free_flight_t
-   use polydem_motion_check, only: motion_check_t
-   use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_named_walls, only: named_walls_t
-   use polydem_neighbours, only: neighbours_t
+   use polydem_neighbour_search, only: neighbour_search_t
    use polydem_packed_history, only: packed_history_t
    use polydem_run_stages, only: run_stages_t
    use polydem_series, only: series_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
    use polydem_traffic, only: traffic_t
-   use polydem_wall, only: wall_t
    use polydem_wall_energy, only: add_loads
-   use polydem_wall_load, only: energies_of_loads, wall_load_t
-   use polydem_wall_record, only: wall_record_t
+   use polydem_walls, only: walls_t
    use polydem_thread_results, only: loop_results_t
    implicit none
    private
@@ -76,32 +68,18 @@ module polydem_simulation
       type(domain_t) :: domain
       !> Bodies
       type(bodies_t) :: bodies
-      !> Fixed bodies with prescribed motions or loads; other fixed bodies are at rest
-      type(wall_t), allocatable :: walls(:)
-      !> Walls by name
-      type(named_walls_t) :: named
-      !> Loads on named walls; not allocated if there are none
-      type(wall_load_t), allocatable :: loads(:)
-      !> Record of the named walls, if there is a series
-      type(wall_record_t) :: record
+      !> Walls: what drives them, their names, loads and record
+      type(walls_t) :: walls
       !> Rows of the series that no file has yet
       type(series_t) :: series
       !> Sources and sinks; not allocated if there are none
       type(traffic_t), allocatable :: traffic
-      !> Maker of the bounding boxes
-      type(box_maker_t) :: maker
-      !> Bounding boxes
-      type(boxes_t) :: boxes
-      !> Pairs of bodies whose boxes overlap
-      type(neighbours_t) :: neighbours
+      !> Boxes of the bodies, and the pairs of those that overlap
+      type(neighbour_search_t) :: search
       !> Table of the contacts of this step; empty if the loop did not keep it
       type(contacts_t) :: contacts
       !> Results of the loop over the contacts of this step
       type(loop_results_t) :: loop
-      !> Number of contacts that this rank owns
-      integer(ip) :: n_contacts = 0_ip
-      !> Sums of the contact forces on each body
-      type(force_sums_t) :: force_sums
       !> Contact history of the pairs
       type(contact_history_t) :: history
       !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps
@@ -110,8 +88,8 @@ module polydem_simulation
       type(force_law_t) :: law
       !> Forces on bodies that are no contacts
       type(body_forces_t) :: body_forces
-      !> Integration scheme
-      class(integrator_t), allocatable :: integrator
+      !> What moves the free bodies
+      type(body_motion_t) :: motion
       !> Energy and momentum balance
       type(energy_balance_t) :: energy_balance
       !> Timers of the stages
@@ -126,14 +104,10 @@ module polydem_simulation
       real(wp) :: expected_stable_step = 0.0_wp
       !> The impact for which it is estimated
       type(expected_impact_t) :: expected
-      !> Check of poses and displacements
-      type(motion_check_t) :: motion_check
       !> Number of bodies that were outside the periodic cell at the start
       integer(lp) :: n_outside = 0_lp
       !> Summary of the relaxation before time 0
       type(relaxation_t) :: relaxation
-      !> What a step leaves out for bodies in free flight
-      type(free_flight_t) :: flight
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
       !> Number of those of them that are no halo bodies
@@ -163,8 +137,8 @@ contains
       type(balance_t), intent(out) :: balance
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
-                            self%force_sums, self%loop%walls, balance)
-      if (allocated(self%loads)) call add_loads(self%energy_balance, energies_of_loads(self%loads, self%dt), balance)
+                            self%loop%force_sums, self%loop%walls, balance)
+      if (allocated(self%walls%loads)) call add_loads(self%energy_balance, self%walls%energies(self%dt), balance)
    end subroutine compute_balance
 
 end module polydem_simulation

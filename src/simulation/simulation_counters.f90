@@ -18,8 +18,8 @@ contains
       integer(lp), allocatable :: counts(:)
 
       if (self%comm%size == 1_ip) return
-      call self%record%collect(self%comm)
-      associate (value => self%neighbours%finder%work%value, n => size(self%sums))
+      call self%walls%record%collect(self%comm)
+      associate (value => self%search%neighbours%finder%work%value, n => size(self%sums))
          counts = [self%sums, value]
          call self%comm%all_reduce_sum(counts)
          if (.not. self%comm%is_root()) counts = 0_lp
@@ -35,7 +35,7 @@ contains
       type(counters_t), intent(inout) :: counters
       integer(lp) :: counts(2)
 
-      counts = [int(self%boxes%n, lp), int(self%neighbours%pairs%n, lp)]
+      counts = [int(self%search%boxes%n, lp), int(self%search%neighbours%pairs%n, lp)]
       call self%comm%all_reduce_sum(counts)
       call collect_counts(self)
       call counters%set('steps', self%step)
@@ -50,11 +50,11 @@ contains
       call counters%set('pairs ended', self%sums(sum_ended), over_steps)
       call counters%set('contacts', self%sums(sum_contacts), over_steps)
       call counters%set('contacts without direction', self%sums(sum_degenerate), over_steps)
-      call self%neighbours%report(counters)
+      call self%search%neighbours%report(counters)
       call counters%set('pairs', counts(2))
       if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
       call report_communication(self%comm, self%domain, size(self%bodies%free, kind=lp), &
-                           int(self%neighbours%pairs%n, lp), counters)
+                           int(self%search%neighbours%pairs%n, lp), counters)
    end subroutine report_counters
 
    !> Count the contacts of all ranks. Collective.

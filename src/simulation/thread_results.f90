@@ -4,7 +4,7 @@ module polydem_thread_results
    use polydem_contact_incidence, only: incidence_t
    use polydem_contact_rows, only: contact_rows_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_sums, only: term_list_t
+   use polydem_force_sums, only: force_sums_t, term_list_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_contact_flags, only: flag_limits_t
    use polydem_wall_shares, only: wall_shares_t
@@ -39,6 +39,10 @@ module polydem_thread_results
       real(dp), allocatable :: elapsed(:)
       !> Part of all pairs up to the end of each range, (0:number of ranges)
       real(dp), allocatable :: upto(:)
+      !> Number of contacts that this rank owns
+      integer(ip) :: n_contacts = 0_ip
+      !> Sums of the contact forces on each body
+      type(force_sums_t) :: force_sums
       !> Contacts with fixed bodies
       type(wall_terms_t) :: walls
       !> Shares of contacts with fixed bodies, if the force law needs them

@@ -14,7 +14,7 @@ module polydem_time_step
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_list, only: pair_list_t
-   use polydem_predict, only: predict_bodies, predict_border, yield_walls
+   use polydem_predict, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
    use polydem_strings, only: to_text
@@ -75,10 +75,11 @@ contains
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
          ! Loads need all ranks.
-         if (self%settings%overlap%degenerate == 'stop' .or. allocated(self%loads)) &
+         if (self%settings%overlap%degenerate == 'stop' .or. allocated(self%walls%loads)) &
             call self%comm%all_reduce_error(error)
          if (allocated(error)) return
-         if (allocated(self%loads)) call yield_walls(self, self%dt)
+         if (allocated(self%walls%loads)) call self%walls%yield(self%comm, self%dt, time_of(self), &
+                                                                   self%bodies, self%loop%walls)
          call complete_step(self, error)
          call timers%lap(stage_integrate)
       end associate
@@ -95,13 +96,14 @@ contains
       integer :: k
 
       if (allocated(error)) return
-      call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%boxes)
+      call turn_and_bound(self%search%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%search%boxes)
       if (.not. self%bodies%cell%is_periodic) return
-      call place_images(self%maker%images, self%bodies%cell, self%boxes)
+      call place_images(self%search%maker%images, self%bodies%cell, self%search%boxes)
       if (.not. allocated(self%domain%reference)) return
-      do k = 1, size(self%walls)
-         has_left = has_left .or. .not. have_boxes_within(self%maker, self%walls(k)%slots, self%boxes, &
-                                                          self%domain%rank_bounds%zone, self%domain%reference)
+      do k = 1, size(self%walls%driven)
+         has_left = has_left .or. .not. have_boxes_within( &
+            self%search%maker, self%walls%driven(k)%slots, self%search%boxes, self%domain%rank_bounds%zone, &
+            self%domain%reference)
       end do
    end subroutine bound_others
 
@@ -111,17 +113,17 @@ contains
       !> Names the step and the finder that failed
       type(error_t), allocatable, intent(inout) :: error
 
-      call self%neighbours%update(self%boxes)
-      if (self%neighbours%pairs%contradictions > 0_lp) then
+      call self%search%neighbours%update(self%search%boxes)
+      if (self%search%neighbours%pairs%contradictions > 0_lp) then
          call raise(error, run_error, 'step '//to_text(self%step)//': finder '// &
                     self%settings%neighbours%finder//' reported changes that contradict its pair list. This is a '// &
                     'program error; use finder all_pairs instead')
          return
       end if
-      call self%flight%turn_joined(self%neighbours%pairs, self%bodies)
-      call carry_history(self%neighbours%pairs, self%history)
-      call restore_history(self%received_history, self%bodies, self%neighbours%pairs, self%history)
-      associate (pairs => self%neighbours%pairs)
+      call self%motion%flight%turn_joined(self%search%neighbours%pairs, self%bodies)
+      call carry_history(self%search%neighbours%pairs, self%history)
+      call restore_history(self%received_history, self%bodies, self%search%neighbours%pairs, self%history)
+      associate (pairs => self%search%neighbours%pairs)
          self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
          self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
       end associate
@@ -147,13 +149,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%force_sums)
+      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
       if (.not. allocated(self%law%constraint)) return
-      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
+      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
       call self%law%constraint%apply(self%dt, self%loop%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
-      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
-      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%force_sums)
+      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%loop%force_sums)
+      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
       call select_walls(self%bodies, self%contacts, self%loop%walls)
    end subroutine add_other_forces
 
@@ -169,7 +171,7 @@ contains
       call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, error)
       call add_other_forces(self, error)
       if (allocated(error)) return
-      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
+      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine compute_forces
 
    !> After a failure, make the table of contacts of this step if the step has not kept it, and the forces on fixed
@@ -196,7 +198,7 @@ contains
          call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
          call add_other_forces(self, known_error)
       end if
-      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
+      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine tabulate_contacts
 
    !> Apply the moves of the pair list to the columns of the contact history.

@@ -60,7 +60,7 @@ contains
             call kinetic_energy(simulation%bodies, simulation%comm, value)
          case ('unbalanced')
             call unbalanced_force(simulation%settings%forces%gravity, simulation%contacts, simulation%comm, &
-                                  simulation%bodies, simulation%force_sums, value)
+                                  simulation%bodies, simulation%loop%force_sums, value)
          case ('count')
             call count_grains(simulation%bodies, simulation%comm, stage%low, stage%high, value)
          case ('stress')

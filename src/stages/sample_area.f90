@@ -58,8 +58,8 @@ contains
       type(simulation_t), intent(in) :: simulation
       real(wp) :: first(2), second(2)
 
-      first = simulation%named%extent(pair(1), axis, simulation%bodies)
-      second = simulation%named%extent(pair(2), axis, simulation%bodies)
+      first = simulation%walls%named%extent(pair(1), axis, simulation%bodies)
+      second = simulation%walls%named%extent(pair(2), axis, simulation%bodies)
       if (second(1) - first(2) >= first(1) - second(2)) then
          area%low(axis) = first(2)
          area%high(axis) = second(1)
@@ -80,9 +80,9 @@ contains
       integer(ip) :: k
 
       pair = 0_ip
-      do k = 1_ip, size(simulation%named%wall, kind=ip)
-         if (simulation%named%wall(k)%name == names(1)%text) pair(1) = k
-         if (simulation%named%wall(k)%name == names(2)%text) pair(2) = k
+      do k = 1_ip, size(simulation%walls%named%wall, kind=ip)
+         if (simulation%walls%named%wall(k)%name == names(1)%text) pair(1) = k
+         if (simulation%walls%named%wall(k)%name == names(2)%text) pair(2) = k
       end do
    end function wall_pair
 

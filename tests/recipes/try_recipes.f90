@@ -45,7 +45,7 @@ contains
       do k = 1, 20000
          call advance(simulation, error)
          if (failed(error)) return
-         if (simulation%neighbours%pairs%n > 0_ip) stored = &
+         if (simulation%search%neighbours%pairs%n > 0_ip) stored = &
             max(stored, simulation%history%column(column_of(simulation%history, 'greatest_area'))%value(1))
          if (simulation%contacts%n == 0_ip .and. simulation%bodies%velocity(2, 1) > 0.0_wp) exit
       end do

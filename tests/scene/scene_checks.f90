@@ -7,6 +7,7 @@ module scene_checks
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
    use polydem_wall, only: wall_t
+   use polydem_walls, only: walls_t
    implicit none
    private
    public :: make_scene, scene_message, find_vertices, polygon_area, all_convex, count_overlaps
@@ -27,14 +28,14 @@ contains
       !> Moving walls
       type(wall_t), allocatable, intent(out), optional :: walls(:)
       type(settings_t) :: own_settings
-      type(wall_t), allocatable :: own_walls(:)
+      type(walls_t) :: own_walls
       character(len=8) :: no_overrides(0)
 
       call read_settings_text('test.nml', '&scene '//entries//' /'//new_line('a') &
                               //'&integrate duration = 1 /'//new_line('a'), no_overrides, own_settings, error)
       if (.not. allocated(error)) call build_scene(own_settings, bodies, own_walls, error)
       if (present(settings)) settings = own_settings
-      if (present(walls) .and. .not. allocated(error)) call move_alloc(own_walls, walls)
+      if (present(walls) .and. .not. allocated(error)) call move_alloc(own_walls%driven, walls)
    end subroutine make_scene
 
    !> Message of the error of a scene; empty if there is none

@@ -69,7 +69,8 @@ contains
          call move_alloc(failure, error)
          return
       end if
-      if (comm%rank == comm%size - 1) call simulation%neighbours%change_finder(invented_pair_t(), simulation%boxes)
+      if (comm%rank == comm%size - 1) &
+         call simulation%search%neighbours%change_finder(invented_pair_t(), simulation%search%boxes)
       call advance(simulation, failure)
       call expect((allocated(failure) .or. comm%rank < comm%size - 1), 'the finder reports no error')
       if (within_step) call expect(allocated(failure), 'a rank does not know of the error of the step')

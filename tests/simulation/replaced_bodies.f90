@@ -140,14 +140,14 @@ contains
       call make(comm, .false., .true., added)
       call replace(simulation, [4_ip, 11_ip, n_pile - 1_ip], added)
       if (allocated(error)) return
-      call expect(size(simulation%walls(1)%slots) == 1, 'a wall keeps a body that left')
+      call expect(size(simulation%walls%driven(1)%slots) == 1, 'a wall keeps a body that left')
       call go_on(simulation, n_steps)
       call hash_all(simulation, hash)
       call expect_contacts(simulation)
       if (allocated(error)) return
       call collect_counts(simulation)
       call expect(comm%size > 1_ip .or. simulation%sums(sum_began) - simulation%sums(sum_ended) == &
-                  int(simulation%neighbours%pairs%n, lp), 'pairs of bodies that leave do not end')
+                  int(simulation%search%neighbours%pairs%n, lp), 'pairs of bodies that leave do not end')
    end subroutine remove_and_add_near
 
    !> A body that enters and flies alone moves like one that starts then.
@@ -193,11 +193,11 @@ contains
       if (allocated(error)) return
       call make(comm, with_pile, with_far, simulation%bodies)
       slots = pack([(s, s=1_ip, simulation%bodies%n)], simulation%bodies%fixed)
-      allocate (simulation%walls(merge(1, 0, with_pile)))
+      allocate (simulation%walls%driven(merge(1, 0, with_pile)))
       motion%kind = 'oscillation'
       motion%amplitude = [1.0e-3_wp, 5.0e-4_wp]
       motion%frequency = 400.0_wp
-      if (with_pile) call new_wall(simulation%walls(1), [motion], simulation%bodies, slots(2:))
+      if (with_pile) call new_wall(simulation%walls%driven(1), [motion], simulation%bodies, slots(2:))
       call start_with_bodies(settings, comm, simulation, error)
       call comm%all_reduce_error(error)
    end subroutine start
@@ -328,7 +328,7 @@ contains
       integer(ip) :: n
 
       if (allocated(error)) return
-      call count_contacts(simulation%comm, simulation%n_contacts, n)
+      call count_contacts(simulation%comm, simulation%loop%n_contacts, n)
       call expect(n > 30_ip, 'the heap has too few contacts')
    end subroutine expect_contacts
 

@@ -27,7 +27,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       self%bodies = bodies
-      self%walls = walls
+      self%walls%driven = walls
       call start_with_bodies(settings, communicator_t(), self, error)
    end subroutine start_simulation
 

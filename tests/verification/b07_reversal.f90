@@ -50,7 +50,7 @@ contains
          simulation%bodies%velocity = -simulation%bodies%velocity
          simulation%bodies%angular_velocity = -simulation%bodies%angular_velocity
          ! The velocities in mid-step are not reversed: no body has coasted with the new velocities.
-         call simulation%flight%forget_velocities()
+         call simulation%motion%flight%forget_velocities()
          call steps(simulation, n, error)
       end if
       call table%note_error(error)

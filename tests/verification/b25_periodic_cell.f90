@@ -191,8 +191,8 @@ contains
             if (.not. allocated(error)) call steps(other, 1, error)
             call table%note_error(error)
             if (allocated(error)) return
-            associate (a => cell%neighbours%pairs, b => other%neighbours%pairs)
-               same = same .and. a%n == b%n .and. cell%n_contacts == other%n_contacts
+            associate (a => cell%search%neighbours%pairs, b => other%search%neighbours%pairs)
+               same = same .and. a%n == b%n .and. cell%loop%n_contacts == other%loop%n_contacts
                if (same) same = all(a%first(:a%n) == b%first(:b%n) .and. a%second(:a%n) == b%second(:b%n))
             end associate
          end do

@@ -59,10 +59,10 @@ contains
          call begin_scene(pair//'&integrate duration = 0.01 dt = '//to_text(duration/real(n, wp), 17)//' /', &
                           simulation, error)
          if (allocated(error)) exit
-         if (k == 1) stiffness = abs(simulation%loads(1)%contact)/depth
+         if (k == 1) stiffness = abs(simulation%walls%loads(1)%contact)/depth
          call steps(simulation, n, error)
          if (allocated(error)) exit
-         place(k) = simulation%loads(1)%place
+         place(k) = simulation%walls%loads(1)%place
       end do
       call table%note_error(error)
       if (allocated(error)) return
@@ -93,8 +93,8 @@ contains
       if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
       call table%note_error(error)
       if (allocated(error)) return
-      width = 0.1_wp + simulation%loads(2)%place
-      height = 0.301_wp + simulation%loads(1)%place
+      width = 0.1_wp + simulation%walls%loads(2)%place
+      height = 0.301_wp + simulation%walls%loads(1)%place
       call stress(simulation%bodies, simulation%contacts, simulation%comm, sample_area_t(size=[width, height]), tensor)
       call table%expect_relative('at rest: stress of the contacts, ''between'' two walls [N/m]', 2.0e3_wp, &
                                  tensor(2, 2), 1.0e-3_wp)
@@ -171,7 +171,7 @@ contains
          call steps(simulation, 1, error)
          if (allocated(error)) exit
          if (real(k, wp)*simulation%dt < 1.2_wp .or. modulo(k, 10) > 0) cycle
-         width = 2.0_wp*side_of(number) + simulation%loads(1)%place
+         width = 2.0_wp*side_of(number) + simulation%walls%loads(1)%place
          ! Top and bottom bodies belong to walls that are nowhere else.
          height = top_of(simulation) - (-side_of(number))
          call stress(simulation%bodies, simulation%contacts, simulation%comm, sample_area_t(size=[width, height]), &
@@ -193,7 +193,7 @@ contains
    real(wp) function top_of(simulation)
       type(simulation_t), intent(in) :: simulation
 
-      associate (wall => simulation%named%wall(4))
+      associate (wall => simulation%walls%named%wall(4))
          top_of = simulation%bodies%position(2, wall%slots(1)) - 0.02_wp
       end associate
    end function top_of
@@ -204,7 +204,7 @@ contains
       integer :: c
 
       force_of_top = 0.0_wp
-      associate (contacts => simulation%contacts, slot => simulation%named%wall(4)%slots(1))
+      associate (contacts => simulation%contacts, slot => simulation%walls%named%wall(4)%slots(1))
          do c = 1, int(contacts%n)
             if (contacts%first(c) == slot) force_of_top = force_of_top + force_along(c)
             if (contacts%second(c) == slot) force_of_top = force_of_top - force_along(c)

@@ -247,8 +247,8 @@ contains
       integer :: k
 
       text = ''
-      do k = 1, size(simulation%walls)
-         associate (wall => simulation%walls(k))
+      do k = 1, size(simulation%walls%driven)
+         associate (wall => simulation%walls%driven(k))
             text = text//', '//join(wall%motions%kind, ' and ')
             if (wall%is_loaded .and. size(wall%motions) > 0) text = text//' and '
             if (wall%is_loaded) text = text//'yielding'

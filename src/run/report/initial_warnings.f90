@@ -77,9 +77,10 @@ contains
       real(wp) :: last
       integer :: j, k
 
-      do k = 1, size(simulation%walls)
-         do j = 1, size(simulation%walls(k)%motions)
-            associate (motion => simulation%walls(k)%motions(j), duration => simulation%settings%integrate%duration)
+      do k = 1, size(simulation%walls%driven)
+         do j = 1, size(simulation%walls%driven(k)%motions)
+            associate (motion => simulation%walls%driven(k)%motions(j), &
+                       duration => simulation%settings%integrate%duration)
                if (.not. allocated(motion%table)) cycle
                last = motion%start + motion%table%time(size(motion%table%time))
                if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &

@@ -91,19 +91,19 @@ contains
       integer :: k
 
       associate (s => simulation, comm => simulation%comm)
-         measures%fixed_boxes = count(s%boxes%fixed(:s%boxes%n), kind=lp)
-         measures%boxes = count(.not. s%boxes%passive(:s%boxes%n), kind=lp)
+         measures%fixed_boxes = count(s%search%boxes%fixed(:s%search%boxes%n), kind=lp)
+         measures%boxes = count(.not. s%search%boxes%passive(:s%search%boxes%n), kind=lp)
          call count_parts(comm, s%bodies, s%contacts, s%settings%guards%listed_depth, measures)
          if (allocated(s%bodies%material)) call count_materials(comm, s%bodies, s%law%pairs%n_materials, measures)
          call measure_bodies(comm, s%bodies, measures)
-         if (measures%free > 0_lp) measures%diameter(2) = s%maker%median_diameter
+         if (measures%free > 0_lp) measures%diameter(2) = s%search%maker%median_diameter
          measures%stiffness = s%law%pairs%stiffness%least()
          if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, measures)
          call greatest_displacement(s%bodies, s%moving(:s%n_moving), s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
-         do k = 1, size(s%walls)
-            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls(k), s%bodies%radius, &
+         do k = 1, size(s%walls%driven)
+            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls%driven(k), s%bodies%radius, &
                                                                                longest_run(s%settings)))
          end do
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))

@@ -2,7 +2,6 @@
 module polydem_series_row
    use polydem_sample_columns, only: set_sample_columns
    use polydem_simulation, only: simulation_t
-   use polydem_wall_load, only: set_load_columns
    implicit none
    private
    public :: collect_row
@@ -16,8 +15,7 @@ contains
       type(simulation_t), intent(inout) :: self
 
       call set_sample_columns(self, self%series%row)
-      call self%record%set_columns(self%comm, self%dt, self%named, self%bodies, self%loop%walls, self%series%row)
-      if (allocated(self%loads)) call set_load_columns(self%loads, self%dt, self%series%row)
+      call self%walls%set_columns(self%comm, self%dt, self%bodies, self%loop%walls, self%series%row)
       if (allocated(self%traffic)) call self%traffic%set_columns(self%series%row)
    end subroutine collect_row
 

@@ -62,14 +62,14 @@ contains
          if (serializer%is_reading) then
             former = s%bodies%id
             call read_bodies(serializer, s%comm, s%bodies)
-            if (.not. allocated(serializer%error)) call s%integrator%start(s%bodies)
+            if (.not. allocated(serializer%error)) call s%motion%integrator%start(s%bodies)
          else
-            call total_forces(s%settings%forces%gravity, s%force_sums, s%bodies)
+            call total_forces(s%settings%forces%gravity, s%loop%force_sums, s%bodies)
             call save_bodies(serializer, s%bodies)
          end if
-         call s%integrator%serialize(serializer)
+         call s%motion%integrator%serialize(serializer)
          if (s%settings%output%energy_balance) call serialize_contributions(s%energy_balance, s%bodies%n, serializer)
-         associate (work => s%neighbours%finder%work)
+         associate (work => s%search%neighbours%finder%work)
             call serializer%field('/run/finder_counts', work%value, '1', 'statistics of the finder so far')
             call serializer%seconds_field('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
          end associate
@@ -81,7 +81,7 @@ contains
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
-         call find_walls(former, s%bodies%id, s%walls)
+         call find_walls(former, s%bodies%id, s%walls%driven)
          call settle_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
@@ -101,8 +101,10 @@ contains
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
-         if (any([(has_table(s%walls(k)), k=1, size(s%walls))])) call serializer%match('/run/motion_tables', &
-            [(hash_of_tables(s%walls(k)), k=1, size(s%walls))], '1', 'hash of the tables of motions')
+         associate (driven => s%walls%driven)
+            if (any([(has_table(driven(k)), k=1, size(driven))])) call serializer%match('/run/motion_tables', &
+               [(hash_of_tables(driven(k)), k=1, size(driven))], '1', 'hash of the tables of motions')
+         end associate
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
                            'ended, contacts without direction')
@@ -112,12 +114,12 @@ contains
          call serializer%seconds_field('/run/stage_most', s%timers%most, 'longest time in a step')
          if (s%settings%output%energy_balance) call serialize_balance(s%energy_balance, serializer)
          if (.not. serializer%is_reading) call find_release(s)
-         call s%named%serialize_gates(serializer)
+         call s%walls%named%serialize_gates(serializer)
          if (.not. serializer%is_reading) call find_leaving(s)
          if (allocated(s%traffic)) call s%traffic%serialize(serializer)
-         if (allocated(s%loads)) call serialize_loads(s%loads, serializer)
+         if (allocated(s%walls%loads)) call serialize_loads(s%walls%loads, serializer)
          if (s%settings%output%series_interval > 0.0_wp) then
-            call s%record%serialize(serializer)
+            call s%walls%record%serialize(serializer)
             call s%series%serialize(serializer)
          end if
       end associate
@@ -146,7 +148,7 @@ contains
       type(simulation_t), intent(inout) :: s
       type(packed_history_t) :: packed
 
-      associate (pairs => s%neighbours%pairs)
+      associate (pairs => s%search%neighbours%pairs)
          call pack_pairs(pairs%n, pairs%first, pairs%second, piece_identifiers(s%bodies), s%history, packed)
       end associate
       call serialize_pairs(serializer, s%history, packed)

@@ -168,7 +168,7 @@ contains
       type(checkpoint_file_t), intent(inout) :: file
       type(row_distribution_t) :: rows
 
-      associate (bodies => simulation%bodies, pairs => simulation%neighbours%pairs)
+      associate (bodies => simulation%bodies, pairs => simulation%search%neighbours%pairs)
          call order_bodies(comm, bodies, rows)
          call file%set_rows('/bodies/', rows)
          call file%set_rows('/pieces/', rows)

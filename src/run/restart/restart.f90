@@ -373,10 +373,10 @@ contains
          call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, s%bodies%cell)
          if (.not. s%comm%is_root()) then
             s%sums = 0_lp
-            call s%record%clear()
+            call s%walls%record%clear()
             s%timers = timers_t()
-            s%neighbours%finder%work%value = 0_lp
-            s%neighbours%finder%work%seconds = 0.0_dp
+            s%search%neighbours%finder%work%value = 0_lp
+            s%search%neighbours%finder%work%seconds = 0.0_dp
          end if
       end associate
       ! Segments behind the checkpoint have some of its rows.

@@ -218,7 +218,7 @@ contains
       if (allocated(error) .or. origin%is_frame) return
       ! Here the state of the integrator is only tried.
       call file%choose_rows('/bodies/', int(simulation%bodies%global_index, lp))
-      call simulation%integrator%serialize(file)
+      call simulation%motion%integrator%serialize(file)
       if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
          call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
       call read_pairs(file, simulation)
@@ -259,7 +259,7 @@ contains
          before = bodies
          call file%choose_rows('/bodies/', int(bodies%global_index, lp))
          call serialize_bodies(file, bodies)
-         call simulation%integrator%serialize(file)
+         call simulation%motion%integrator%serialize(file)
          call read_pairs(file, simulation)
          do s = 1_ip, bodies%n
             if (.not. bodies%fixed(s)) cycle

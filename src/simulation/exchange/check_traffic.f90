@@ -96,7 +96,7 @@ contains
                return
             end if
          end if
-         if (size(self%walls) > 0 .or. self%named%has_gates()) return
+         if (size(self%walls%driven) > 0 .or. self%walls%named%has_gates()) return
          has_room = .false.
          do k = 1, size(candidates)
             do j = 1, size(candidates(k)%place, 2)

@@ -107,7 +107,7 @@ contains
       call list_departures(self, departing, kept)
       if (size(departing%id) == 0) return
       call find_leaving_totals(self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, &
-                               self%force_sums, self%loop%walls, .not. kept, total)
+                               self%loop%force_sums, self%loop%walls, .not. kept, total)
       associate (contacts => self%contacts, bodies => self%bodies)
          if (self%loop%walls%energy_is_known) then
             do c = 1_ip, contacts%n

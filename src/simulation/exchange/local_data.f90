@@ -37,8 +37,8 @@ contains
       !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
       real(wp), intent(in), optional :: median_diameter
 
-      call self%named%find_slots(self%bodies)
-      call self%named%mark_gone(self%bodies)
+      call self%walls%named%find_slots(self%bodies)
+      call self%walls%named%mark_gone(self%bodies)
       call find_folds(self%bodies)
       call self%law%measure(self%bodies)
       if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
@@ -47,28 +47,28 @@ contains
       self%loop%walls%border%n = 0_ip
       self%loop%walls%energy_is_known = self%law%energy_is_known
       call fit_table(self%law, self%loop%flagged)
-      self%n_contacts = 0_ip
+      self%loop%n_contacts = 0_ip
       self%loop%passing_pair = 0_ip
-      call start_sums(self%bodies%n, self%force_sums)
+      call start_sums(self%bodies%n, self%loop%force_sums)
       ! The border of a sheared cell acts on bodies that nothing touches.
-      call self%flight%start(self%settings%forces%gravity, &
+      call self%motion%flight%start(self%settings%forces%gravity, &
                              self%body_forces%act() .or. self%bodies%cell%is_sheared .or. &
-                             self%bodies%pieces%most > 1_ip, self%integrator, self%bodies%n)
+                             self%bodies%pieces%most > 1_ip, self%motion%integrator, self%bodies%n)
       self%loop%incidence = incidence_t()
-      call list_moving(self%bodies, self%walls, self%moving, self%n_moving)
-      if (.not. allocated(self%motion_check%choice)) call new_motion_check( &
-         self%motion_check, self%settings%guards, self%bodies, shorter_step(self%settings%integrate))
+      call list_moving(self%bodies, self%walls%driven, self%moving, self%n_moving)
+      if (.not. allocated(self%motion%check%choice)) call new_motion_check( &
+         self%motion%check, self%settings%guards, self%bodies, shorter_step(self%settings%integrate))
       associate (choice => self%settings%boxes)
-         call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error, &
-            median_diameter, self%domain%margin)
+         call new_box_maker(self%search%maker, self%bodies, choice%largest_ratio, choice%margin, self%search%boxes, &
+                            error, median_diameter, self%domain%margin)
       end associate
       if (allocated(error)) return
-      call restart_neighbours(self%neighbours, self%boxes)
+      call restart_neighbours(self%search%neighbours, self%search%boxes)
       call allocate_history(self%law, self%settings%guards, self%history)
       call new_flag_limits(self%loop%flag_limits, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
       if (self%settings%guards%step /= 'off') self%loop%flag_limits%soft = &
-         stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
+         stiffest_product(self%law, self%motion%integrator%stability(), self%bodies, self%dt/warn_share)
    end subroutine rebuild_local_data
 
    !> Limit the displacement of a step to that of the thinnest body of all ranks. Collective.

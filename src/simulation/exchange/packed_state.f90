@@ -78,9 +78,9 @@ contains
 
       former = self%bodies%id
       call unpack_bodies(packed%bodies, self%bodies, slots)
-      call find_walls(former, self%bodies%id, self%walls)
+      call find_walls(former, self%bodies%id, self%walls%driven)
       call packed%columns%restore_to(slots(:packed%columns%n_rows))
-      call self%integrator%start(self%bodies)
+      call self%motion%integrator%start(self%bodies)
       call serialize_columns(packed%columns, self)
    end subroutine unpack_state
 
@@ -103,7 +103,7 @@ contains
       type(simulation_t), intent(inout) :: self
 
       call serialize_bodies(serializer, self%bodies)
-      call self%integrator%serialize_step(serializer)
+      call self%motion%integrator%serialize_step(serializer)
       if (self%settings%output%energy_balance) &
          call serialize_contributions(self%energy_balance, self%bodies%n, serializer)
       if (.not. allocated(self%relaxation%from)) return

@@ -50,7 +50,7 @@ contains
 
       have_boxes_left = .false.
       if (.not. allocated(self%domain%reference)) return
-      have_boxes_left = .not. have_boxes_within(self%maker, self%bodies%free, self%boxes, &
+      have_boxes_left = .not. have_boxes_within(self%search%maker, self%bodies%free, self%search%boxes, &
                                                 self%domain%rank_bounds%zone, self%domain%reference)
    end function have_boxes_left
 
@@ -78,7 +78,8 @@ contains
       end if
       ! When the bodies have just been replaced, there are no pairs that tell the work of a rank.
       if (self%domain%last_step < 0_lp .or. allocated(self%domain%reference)) call balance_work( &
-         self%comm, self%step, self%bodies, self%neighbours%pairs, real(sum(self%timers%total(work_stages)), dp), &
+         self%comm, self%step, self%bodies, self%search%neighbours%pairs, &
+         real(sum(self%timers%total(work_stages)), dp), &
          self%domain)
       call migrate(self, error)
    end subroutine redistribute
@@ -146,7 +147,8 @@ contains
       integer(ip) :: k
 
       owner = owners_of(self%domain, self%bodies)
-      call send_history(self%comm, self%bodies, self%neighbours%pairs, self%history, owner, self%received_history)
+      call send_history(self%comm, self%bodies, self%search%neighbours%pairs, self%history, owner, &
+                        self%received_history)
       call send_bodies(self, owner, own)
       call receive_halo(self, own)
       call self%domain%halo%follow(self%comm, self%bodies)
@@ -154,8 +156,8 @@ contains
       call rebuild_local_data(self, error, self%domain%median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call measure_halo(self%comm, self%maker%images, self%bodies%n_all, self%domain)
-      call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
+      call measure_halo(self%comm, self%search%maker%images, self%bodies%n_all, self%domain)
+      call self%domain%set_reference(self%search%boxes%bounds(:, :self%search%boxes%n), self%step)
       associate (domain => self%domain)
          domain%redistributions = domain%redistributions + 1_lp
          if (domain%redistributions > 1_lp) return

@@ -109,7 +109,7 @@ contains
 
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
       call rebuild_local_data(self, error, self%domain%median_diameter)
-      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion_check)
+      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion%check)
       call self%domain%forget_halo()
       call self%comm%all_reduce_error(error)
    end subroutine settle_bodies
@@ -136,7 +136,7 @@ contains
 
       if (allocated(self%received_history)) return
       allocate (self%received_history)
-      associate (pairs => self%neighbours%pairs)
+      associate (pairs => self%search%neighbours%pairs)
          call pack_pairs(pairs%n, pairs%first, pairs%second, piece_identifiers(self%bodies), self%history, &
                          self%received_history)
       end associate
@@ -173,8 +173,8 @@ contains
          call begin_sums(added%n, sums)
          call self%body_forces%apply(gravity, time_of(self), added, sums)
          call total_forces(gravity, sums, added)
-         call self%integrator%start_accelerations(gravity, added)
-         if (.not. self%integrator%starts_from_forces) call accelerate_by_fields(sums, added)
+         call self%motion%integrator%start_accelerations(gravity, added)
+         if (.not. self%motion%integrator%starts_from_forces) call accelerate_by_fields(sums, added)
          if (self%settings%output%energy_balance) call start_entering(gravity, added, sums, entering)
       end associate
    end subroutine start_added

@@ -28,12 +28,12 @@ contains
       !> Allocated if what depends on the bodies cannot be built anew
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. self%named%any_vanishes(time_of(self))) return
+      if (.not. self%walls%named%any_vanishes(time_of(self))) return
       call find_release(self)
-      call release_energy(self%energy_balance, self%named%released)
-      self%named%released = 0.0_wp
+      call release_energy(self%energy_balance, self%walls%named%released)
+      self%walls%named%released = 0.0_wp
       call hold_history(self)
-      where (self%named%vanishing(time_of(self))) self%named%wall%is_gone = .true.
+      where (self%walls%named%vanishing(time_of(self))) self%walls%named%wall%is_gone = .true.
       call settle_bodies(self, error)
    end subroutine remove_walls
 
@@ -46,20 +46,20 @@ contains
       logical, allocatable :: leaves(:)
       integer(ip) :: c, w
 
-      if (.not. self%named%has_gates() .or. self%loop%step /= self%step) return
-      self%named%released = 0.0_wp
-      leaves = self%named%vanishing(time_of(self))
+      if (.not. self%walls%named%has_gates() .or. self%loop%step /= self%step) return
+      self%walls%named%released = 0.0_wp
+      leaves = self%walls%named%vanishing(time_of(self))
       if (.not. any(leaves) .or. .not. self%loop%walls%energy_is_known) return
       associate (terms => self%loop%walls)
          do c = 1_ip, terms%n
-            w = self%named%wall_of(terms%slots(1, c))
+            w = self%walls%named%wall_of(terms%slots(1, c))
             if (w == 0_ip) cycle
             ! The energy of a contact is divided between its two bodies.
             if (leaves(w)) call sums(1)%add(2.0_wp*terms%term(sum_energy, c))
          end do
       end associate
       call all_reduce_exact_sums(self%comm, sums)
-      self%named%released = sums(1)%value()
+      self%walls%named%released = sums(1)%value()
    end subroutine find_release
 
 end module polydem_vanishing_walls

@@ -34,7 +34,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call self%warning%absorb(simulation%motion_check%warning)
+      call self%warning%absorb(simulation%motion%check%warning)
    end subroutine look
 
 end module polydem_displacement_guard

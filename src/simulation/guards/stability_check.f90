@@ -64,7 +64,7 @@ contains
          do c = 1_ip, flagged%n
             if (.not. flagged%length(c)*flagged%inverse_length(c)*(bodies%inverse_mass(flagged%first(c)) &
                 + bodies%inverse_mass(flagged%second(c))) > self%loop%flag_limits%soft) cycle
-            this = self%dt/stable_step_alone(self%law, self%integrator%stability(), bodies, flagged, c)
+            this = self%dt/stable_step_alone(self%law, self%motion%integrator%stability(), bodies, flagged, c)
             if (this <= share) cycle
             share = this
             worst = c
@@ -136,8 +136,8 @@ contains
 
       numbers = contact_numbers(self%bodies%n, self%loop%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
-      if (allocated(self%loads)) yielding = wall_mobilities(self%loads, self%named, self%bodies)
-      call stable_step_of_contacts(self%law, self%integrator%stability(), self%bodies, numbers, self%contacts, &
+      if (allocated(self%walls%loads)) yielding = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      call stable_step_of_contacts(self%law, self%motion%integrator%stability(), self%bodies, numbers, self%contacts, &
                                    stable, critical, yielding)
       least = stable
       call reduce_to_least(self%comm, least)

@@ -29,8 +29,8 @@ contains
          if (allocated(error)) return
          call new_traffic(settings, self%traffic, error)
          if (allocated(error)) return
-         call new_integrator(settings%integrate, self%integrator)
-         call choose_finder(self%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, &
+         call new_integrator(settings%integrate, self%motion%integrator)
+         call choose_finder(self%search%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, &
                             self%bodies%isa)
          call choose_all_fields(settings, self%stages%drag, self%body_forces)
       end associate

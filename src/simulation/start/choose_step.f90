@@ -42,11 +42,11 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      if (allocated(self%loads)) &
-         call prepare_loads(self%settings%forces%stiffness, self%bodies, self%comm, self%named, self%loads)
+      if (allocated(self%walls%loads)) &
+         call prepare_loads(self%settings%forces%stiffness, self%bodies, self%comm, self%walls%named, self%walls%loads)
       call find_expected_speed(self)
-      call stable_step_of_shapes(self%law, self%integrator%stability(), self%bodies, self%expected%speed, stable, &
-                                 critical, depth, length, damped, mobility_of_walls(self))
+      call stable_step_of_shapes(self%law, self%motion%integrator%stability(), self%bodies, self%expected%speed, &
+                                 stable, critical, depth, length, damped, mobility_of_walls(self))
       has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
       call reduce_to_greatest(self%comm, has_free)
       limiting = 0_lp
@@ -128,7 +128,7 @@ contains
       real(wp) :: stable, depth, length, damped
       integer(ip) :: critical
 
-      call stable_step_of_shapes(self%law, self%integrator%stability(), sample, self%expected%speed, stable, &
+      call stable_step_of_shapes(self%law, self%motion%integrator%stability(), sample, self%expected%speed, stable, &
                                  critical, depth, length, damped, mobility_of_walls(self))
       has_free = 1.0_wp
       if (stable >= self%expected_stable_step) return
@@ -180,14 +180,14 @@ contains
       integer :: k
 
       greatest = 0.0_wp
-      if (.not. allocated(self%loads)) return
-      mobility = wall_mobilities(self%loads, self%named, self%bodies)
-      do k = 1, size(self%loads)
-         associate (w => self%loads(k)%wall)
-            extent(:, 1) = self%named%extent(w, 1, self%bodies)
-            extent(:, 2) = self%named%extent(w, 2, self%bodies)
-            if (size(self%named%wall(w)%slots) > 0) greatest = max(greatest, &
-               mobility(self%named%wall(w)%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
+      if (.not. allocated(self%walls%loads)) return
+      mobility = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      do k = 1, size(self%walls%loads)
+         associate (w => self%walls%loads(k)%wall)
+            extent(:, 1) = self%walls%named%extent(w, 1, self%bodies)
+            extent(:, 2) = self%walls%named%extent(w, 2, self%bodies)
+            if (size(self%walls%named%wall(w)%slots) > 0) greatest = max(greatest, &
+               mobility(self%walls%named%wall(w)%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
          end associate
       end do
    end function mobility_of_walls

@@ -64,8 +64,8 @@ contains
                   (bodies%position(2, s) - (bodies%cell%low(2) + 0.5_wp*bodies%cell%size(2)))
             end do
          end if
-         do s = 1_ip, size(self%walls, kind=ip)
-            self%walls(s)%position = bodies%position(:, self%walls(s)%slots)
+         do s = 1_ip, size(self%walls%driven, kind=ip)
+            self%walls%driven(s)%position = bodies%position(:, self%walls%driven(s)%slots)
          end do
       end associate
    end subroutine enter_cell
@@ -137,9 +137,9 @@ contains
       integer(ip) :: k
       integer :: axis, w
 
-      do w = 1, size(self%walls)
-         do k = 1_ip, size(self%walls(w)%slots, kind=ip)
-            associate (s => self%walls(w)%slots(k), bodies => self%bodies)
+      do w = 1, size(self%walls%driven)
+         do k = 1_ip, size(self%walls%driven(w)%slots, kind=ip)
+            associate (s => self%walls%driven(w)%slots(k), bodies => self%bodies)
                if (allocated(error)) return
                if (turns(self, w, s)) call refuse(self, s, 'turns, which its copies do not; leave out the angles '// &
                   'of its table of motion, and loads along ''angle''', error)
@@ -166,9 +166,9 @@ contains
       integer :: m
 
       turns = is_loaded(self, s, along_angle)
-      do m = 1, size(self%walls(w)%motions)
-         if (.not. allocated(self%walls(w)%motions(m)%table)) cycle
-         values = greatest_values(self%walls(w)%motions(m)%table)
+      do m = 1, size(self%walls%driven(w)%motions)
+         if (.not. allocated(self%walls%driven(w)%motions(m)%table)) cycle
+         values = greatest_values(self%walls%driven(w)%motions(m)%table)
          turns = turns .or. values(3) > 0.0_wp
       end do
    end function turns
@@ -183,8 +183,8 @@ contains
       integer :: m
 
       moves_along = is_loaded(self, s, axis)
-      do m = 1, size(self%walls(w)%motions)
-         associate (motion => self%walls(w)%motions(m))
+      do m = 1, size(self%walls%driven(w)%motions)
+         associate (motion => self%walls%driven(w)%motions(m))
             if (motion%kind == 'conveyor') cycle
             values = 0.0_wp
             if (allocated(motion%table)) values = greatest_values(motion%table)
@@ -200,8 +200,8 @@ contains
       integer, intent(in) :: direction
 
       is_loaded = .false.
-      if (allocated(self%loads)) is_loaded = any(self%loads%wall == self%named%wall_of(s) .and. &
-                                                 self%loads%direction == direction)
+      if (allocated(self%walls%loads)) is_loaded = any(self%walls%loads%wall == self%walls%named%wall_of(s) .and. &
+                                                 self%walls%loads%direction == direction)
    end function is_loaded
 
    !> Raise an error about a fixed body in a periodic cell.

@@ -50,8 +50,8 @@ contains
                fall = fall + hypotenuse(forces%shake(1), forces%shake(2))/(pi*forces%shake_frequency)
          end associate
          wall = 0.0_wp
-         do k = 1, size(self%walls)
-            wall = max(wall, greatest_wall_speed(self%walls(k), self%bodies%radius, longest_run(self%settings)))
+         do k = 1, size(self%walls%driven)
+            wall = max(wall, greatest_wall_speed(self%walls%driven(k), self%bodies%radius, longest_run(self%settings)))
          end do
          expected%speed = max(start, fall, wall)
          expected%origin = 'the velocities at the start'
@@ -99,7 +99,7 @@ contains
 
       turned = gravity
       do k = 1, merge(4, 1, abs(self%settings%forces%turn_rate) > 0.0_wp)
-         call find_fall_speed(self%settings, self%bodies, size(self%walls) > 0, self%comm, turned, speed)
+         call find_fall_speed(self%settings, self%bodies, size(self%walls%driven) > 0, self%comm, turned, speed)
          greatest = max(greatest, speed)
          turned = [-turned(2), turned(1)]
       end do

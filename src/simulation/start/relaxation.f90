@@ -132,7 +132,7 @@ contains
 
       call self%domain%halo%follow(self%comm, self%bodies)
       call turn_bodies(self%bodies, self%moving)
-      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      call update_boxes(self%search%maker, self%bodies, self%moving, self%search%boxes)
       redistributions = self%domain%redistributions
       call redistribute(self, have_boxes_left(self), error)
       if (allocated(error)) return
@@ -141,10 +141,10 @@ contains
       ! Other bodies have other boxes.
       associate (settings => self%settings%neighbours)
          if (.not. allocated(neighbours%finder) .or. self%domain%redistributions > redistributions) &
-            call new_neighbours(neighbours, settings%finder, self%boxes, error, settings%skin, self%bodies%isa)
+            call new_neighbours(neighbours, settings%finder, self%search%boxes, error, settings%skin, self%bodies%isa)
       end associate
       if (allocated(error)) return
-      call neighbours%update(self%boxes)
+      call neighbours%update(self%search%boxes)
       associate (pairs => neighbours%pairs)
          call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, no_history, contacts)
       end associate

@@ -9,8 +9,7 @@ module polydem_start_forces
    use polydem_force_sums, only: force_sums_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: wp
-   use polydem_predict, only: yield_walls
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: simulation_t, time_of
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
    implicit none
@@ -30,13 +29,15 @@ contains
       call compute_forces(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call start_integration(self%settings%forces%gravity, self%force_sums, self%bodies, self%integrator, &
+      call start_integration(self%settings%forces%gravity, self%loop%force_sums, self%bodies, self%motion%integrator, &
                              self%history)
-      if (allocated(self%loads)) call yield_walls(self, 0.0_wp)
+      if (allocated(self%walls%loads)) call self%walls%yield(self%comm, 0.0_wp, time_of(self), &
+                                                                self%bodies, self%loop%walls)
       if (self%settings%output%series_interval > 0.0_wp) &
-         call self%record%start(self%named, self%bodies, self%loop%walls)
+         call self%walls%record%start(self%walls%named, self%bodies, self%loop%walls)
       if (self%settings%output%energy_balance) call start_energy_balance( &
-         self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%force_sums, self%loop%walls)
+         self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%loop%force_sums, &
+         self%loop%walls)
       if (allocated(self%traffic)) call expect_changes(self%energy_balance)
       self%timers = timers_t()
    end subroutine start_forces

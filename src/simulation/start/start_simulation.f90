@@ -14,7 +14,6 @@ module polydem_start_simulation
    use polydem_global_reductions, only: find_median
    use polydem_kinds, only: wp
    use polydem_local_data, only: limit_displacement, rebuild_local_data
-   use polydem_predict, only: move_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
    use polydem_settings, only: settings_t
@@ -74,13 +73,13 @@ contains
       if (.not. allocated(error)) call check_constraint(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion_check)
-      call self%integrator%start(self%bodies)
+      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion%check)
+      call self%motion%integrator%start(self%bodies)
       if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
       call continue_stages(self, error)
-      call move_walls(self%walls, self%named, 0.0_wp, self%bodies, self%loads)
-      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      call self%walls%move(0.0_wp, self%bodies)
+      call update_boxes(self%search%maker, self%bodies, self%moving, self%search%boxes)
       if (.not. allocated(error)) call check_traffic(self, error)
       call redistribute(self, .false., error)
       call self%comm%all_reduce_error(error)

@@ -1,10 +1,10 @@
-!> The moving walls of a scene: fixed bodies with the same prescribed motions and loads.
-module polydem_assign_motions
+!> The walls of a scene: which fixed bodies motions and loads drive, and the walls by name.
+module polydem_assign_walls
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion_file, only: read_motion_table
-   use polydem_name_walls, only: ids_of_wall
+   use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls
    use polydem_outlines, only: pi
    use polydem_prescribed_motion, only: motion_t
    use polydem_run_duration, only: number_of_stage
@@ -13,11 +13,31 @@ module polydem_assign_motions
    use polydem_strings, only: to_text
    use polydem_wall, only: new_wall, wall_t
    use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_walls, only: walls_t
    implicit none
    private
-   public :: assign_motions
+   public :: assign_walls
 
 contains
+
+   !> Make the walls of a scene from its settings.
+   subroutine assign_walls(settings, bodies, named, walls, error)
+      !> Settings: groups &wall, &motion and &load
+      type(settings_t), intent(in) :: settings
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+      !> Walls with names and their bodies, which motions and loads refer to
+      type(wall_bodies_t), intent(in) :: named(:)
+      !> The walls; their record is not started
+      type(walls_t), intent(inout) :: walls
+      !> Allocated if a motion or a load names bodies that cannot move
+      type(error_t), allocatable, intent(inout) :: error
+
+      call assign_motions(settings, bodies, named, walls%driven, error)
+      if (allocated(error)) return
+      call name_walls(settings, bodies, named, walls%driven, walls%named)
+      call assign_loads(settings, named, walls%loads)
+   end subroutine assign_walls
 
    !> Find the bodies of each prescribed motion and load, and make walls of those with the same ones.
    subroutine assign_motions(settings, bodies, named, walls, error)
@@ -173,4 +193,4 @@ contains
       end do
    end subroutine find_moved
 
-end module polydem_assign_motions
+end module polydem_assign_walls

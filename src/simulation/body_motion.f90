@@ -1,0 +1,39 @@
+!> What moves the free bodies: the integration scheme, what it leaves out in free flight, and the limit
+!> of displacements.
+module polydem_body_motion
+   use polydem_bodies, only: bodies_t
+   use polydem_free_flight, only: free_flight_t
+   use polydem_integrator, only: integrator_t
+   use polydem_kinds, only: ip, wp
+   use polydem_motion_check, only: motion_check_t
+   implicit none
+   private
+   public :: body_motion_t
+
+   !> Motion of the free bodies
+   type :: body_motion_t
+      !> Integration scheme
+      class(integrator_t), allocatable :: integrator
+      !> What a step leaves out for bodies in free flight
+      type(free_flight_t) :: flight
+      !> Check of poses and displacements
+      type(motion_check_t) :: check
+   contains
+      procedure :: predict
+   end type body_motion_t
+
+contains
+
+   !> Predict up to `block_size` bodies at the end of the step. Several threads may call it for different bodies.
+   subroutine predict(self, dt, slots, bodies)
+      class(body_motion_t), intent(inout) :: self
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Slots of the bodies, ascending
+      integer(ip), intent(in), contiguous :: slots(:)
+      type(bodies_t), intent(inout) :: bodies
+
+      call self%flight%predict(self%integrator, self%check, dt, slots, bodies)
+   end subroutine predict
+
+end module polydem_body_motion
