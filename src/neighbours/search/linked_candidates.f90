@@ -4,7 +4,7 @@
 !> 2) of candidate k; its number 2(k - 1) + s is its *link*. Removing and adding a candidate cost O(1). A candidate that
 !> is removed leaves a *hole*, a box with itself. A new candidate fills a hole near the other candidates of its box: the
 !> list is divided into regions, and the holes of each form a linked list. When many candidates had to go elsewhere, the
-!> list is sorted. So candidates of near boxes stay near each other, and threads that compare different parts of the list
+!> list is sorted. So candidates of near boxes stay near each other, and threads that compare different parts of it
 !> share few boxes.
 module polydem_linked_candidates
    use polydem_candidates, only: candidates_t
