@@ -3,13 +3,18 @@
 !> A fixed body that *spans* the cell, such as a straight floor, reaches beyond both of its borders. It does not repeat
 !> along this axis, and vectors to it are as in the plane. A free body that has left the cell returns at the start of
 !> the next step. Between two steps it may therefore be outside by the motion of one step.
+!>
+!> When the size of a cell changes, all places are stretched with it. Velocities are those relative to this motion. They
+!> shrink as the size grows, so that the volume in phase space is constant (M. Parrinello & A. Rahman, J. Appl. Phys. 52
+!> (1981) 7182): for a gas this is its work on the cell. A step first stretches, then moves: an error of first order
+!> in the growth of one step, which does not accumulate.
 module polydem_bodies_in_cell
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: cell_t
+   use polydem_cell, only: cell_t, grow_cell, shear_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: set_cell, find_folds, wrap_bodies, put_into_cell, path_of
+   public :: set_cell, change_cell, find_folds, stretch_bodies, wrap_bodies, put_into_cell, path_of
 
 contains
 
@@ -22,6 +27,25 @@ contains
       if (cell%is_periodic .and. .not. allocated(bodies%image)) allocate (bodies%image(bodies%n, 2), source=0_ip)
       if (cell%is_sheared .and. .not. allocated(bodies%slid)) allocate (bodies%slid(bodies%n), source=0.0_wp)
    end subroutine set_cell
+
+   !> Change size and shear of the cell by a step.
+   pure subroutine change_cell(dt, from, to, bodies)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Simulated time at the start and at the end of the step [s]
+      real(wp), intent(in) :: from, to
+      !> Bodies; their cell and `folds` change
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: s
+
+      if (allocated(bodies%cell%load)) then
+         call grow_cell(dt, bodies%cell)
+         do s = 1_ip, bodies%n
+            where (bodies%folds(:, s) > 0.0_wp) bodies%folds(:, s) = bodies%cell%inverse
+         end do
+      end if
+      call shear_cell(bodies%cell, from, to)
+   end subroutine change_cell
 
    !> Find out along which axes bodies repeat.
    pure subroutine find_folds(bodies)
@@ -59,6 +83,25 @@ contains
       place = bodies%position(:, s)
       if (allocated(bodies%image)) place = place + real(bodies%image(s, :), wp)*bodies%cell%size
    end function path_of
+
+   !> Stretch the places of some free bodies as the cell grows in this step. Several threads may call it for different
+   !> bodies.
+   pure subroutine stretch_bodies(bodies, slots)
+      !> Bodies in a cell that yields, at the start of a step; `position` and `velocity` change
+      type(bodies_t), intent(inout) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in), contiguous :: slots(:)
+      integer(ip) :: k
+
+      associate (load => bodies%cell%load)
+         do k = 1_ip, size(slots, kind=ip)
+            associate (s => slots(k))
+               bodies%position(:, s) = load%centre + load%stretch*(bodies%position(:, s) - load%centre)
+               bodies%velocity(:, s) = bodies%velocity(:, s)/load%stretch
+            end associate
+         end do
+      end associate
+   end subroutine stretch_bodies
 
    !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
    pure subroutine wrap_bodies(bodies, slots)

@@ -4,12 +4,41 @@
 !> missed as long as half the cell is longer than two bodies reach together; then at most one copy of a body can touch.
 !>
 !> In a *sheared* cell the copies above and below move along x, the upper one by `shift` with the velocity `jump`
-!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time.
+!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields.
+!>
+!> A cell that *yields* has a size that obeys a stress (`polydem_cell_load`).
 module polydem_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: cell_t, new_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y
+   public :: cell_t, cell_load_t, new_cell, grow_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y
+
+   !> What makes the size of a cell obey a stress, (x and y)
+   type :: cell_load_t
+      !> Whether the cell yields along an axis
+      logical :: yields(2) = .false.
+      !> Stress that it obeys, positive in compression [N/m2], and time in which the stress grows [s]
+      real(wp) :: stress(2) = 0.0_wp, ramp = 0.0_wp
+      !> Mass [kg/m]; damping over the critical one, and its coefficient [kg/(m s)]
+      real(wp) :: mass = 0.0_wp, damping_ratio = 1.0_wp, damping = 0.0_wp
+      !> Times between which the cell yields [s]
+      real(wp) :: start = 0.0_wp, end = huge(1.0_wp)
+      !> Number of the stage of the run in which it yields, which sets start and end; 0: it depends on no stage
+      integer(ip) :: stage = 0_ip
+      !> Centre of the cell, which stays where it is [m]
+      real(wp) :: centre(2) = 0.0_wp
+      !> Least size for the largest body [m]
+      real(wp) :: least = 0.0_wp
+      !> Velocity of the size [m/s], that in the middle of the step, and acceleration [m/s2]
+      real(wp) :: speed(2) = 0.0_wp, half(2) = 0.0_wp, change(2) = 0.0_wp
+      !> Factor by which the size grows in this step
+      real(wp) :: stretch(2) = 1.0_wp
+      !> Unit of the sums over contacts of force times distance, a power of 2 [N]
+      real(wp) :: unit = 1.0_wp
+      !> Sums over steps of the powers of the elastic, the other normal and the tangential forces of contacts on the
+      !> motion of the cell, and the last powers [W/m]
+      real(wp) :: power_sum(3) = 0.0_wp, power(3) = 0.0_wp
+   end type cell_load_t
 
    !> Periodic cell
    type :: cell_t
@@ -29,6 +58,8 @@ module polydem_cell
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Both at the start of the step
       real(wp) :: former_shift = 0.0_wp, former_jump = 0.0_wp
+      !> The stress that its size obeys; not allocated if the size is constant
+      type(cell_load_t), allocatable :: load
    end type cell_t
 
    !> A number of such size that adding it rounds to whole numbers
@@ -60,16 +91,43 @@ contains
       call shear_cell(cell, 0.0_wp, 0.0_wp)
    end function new_cell
 
-   !> Shear the cell for a step. Nothing is done if it is not sheared.
+   !> Shear the cell for a step. Nothing is done if it is not sheared. The velocity of a cell that yields is no closed
+   !> function of time; its displacement is summed by the trapezoidal rule.
    elemental subroutine shear_cell(cell, from, to)
       type(cell_t), intent(inout) :: cell
       !> Simulated time at the start and at the end of the step [s]
       real(wp), intent(in) :: from, to
 
       if (.not. cell%is_sheared) return
-      call find_shear(cell, from, cell%former_shift, cell%former_jump)
-      call find_shear(cell, to, cell%shift, cell%jump)
+      if (.not. allocated(cell%load)) then
+         call find_shear(cell, from, cell%former_shift, cell%former_jump)
+         call find_shear(cell, to, cell%shift, cell%jump)
+      else
+         cell%former_shift = cell%shift
+         cell%former_jump = cell%jump
+         call find_shear(cell, to, cell%shift, cell%jump)
+         cell%shift = modulo(cell%former_shift + 0.5_wp*(to - from)*(cell%former_jump + cell%jump), cell%size(1))
+      end if
    end subroutine shear_cell
+
+   !> Change the size of a cell that yields by its motion in a step, by velocity Verlet.
+   pure subroutine grow_cell(dt, cell)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> A cell with a load; the velocity of its size is predicted
+      type(cell_t), intent(inout) :: cell
+      real(wp) :: former(2)
+
+      associate (load => cell%load)
+         former = cell%size
+         load%half = load%speed + 0.5_wp*dt*load%change
+         cell%size = former + dt*load%half
+         load%stretch = cell%size/former
+         load%speed = load%half + 0.5_wp*dt*load%change
+         cell%low = load%centre - 0.5_wp*cell%size
+         cell%inverse = 1.0_wp/cell%size
+      end associate
+   end subroutine grow_cell
 
    !> Find displacement and velocity of the copy above at a time. During the ramp the rate rises as u^2 (3 - 2 u), as
    !> that of prescribed motions.

@@ -9,7 +9,7 @@ module polydem_begin_stage
    use polydem_run_duration, only: longest_stage
    use polydem_run_stages, only: run_stages_t
    use polydem_settings, only: forces_settings_t, settings_t, stage_settings_t
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: acts_on_all, simulation_t
    use polydem_sort, only: place_in
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
@@ -77,8 +77,8 @@ contains
 
       call self%law%scale_friction(self%stages%friction_scale)
       call self%body_forces%configure(self%settings%forces)
-      call self%motion%flight%start(self%settings%forces%gravity, self%body_forces%act() .or. &
-                             self%bodies%pieces%most > 1_ip, self%motion%integrator, self%bodies%n)
+      call self%motion%flight%start(self%settings%forces%gravity, acts_on_all(self), self%motion%integrator, &
+                                    self%bodies%n)
       do j = 1, size(self%walls%driven)
          do k = 1, size(self%walls%driven(j)%motions)
             associate (motion => self%walls%driven(j)%motions(k), stages => self%stages)
@@ -86,6 +86,11 @@ contains
             end associate
          end do
       end do
+      if (allocated(self%bodies%cell%load)) then
+         associate (load => self%bodies%cell%load)
+            call set_window(self%stages, self%dt, load%stage, load%start, load%end)
+         end associate
+      end if
       if (.not. allocated(self%walls%loads)) return
       do k = 1, size(self%walls%loads)
          associate (load => self%walls%loads(k))
@@ -94,7 +99,7 @@ contains
       end do
    end subroutine use_parameters
 
-   !> Set the times at which a motion or a load begins and ends, as far as they are known.
+   !> Set the times at which a motion, a load or the cell begins and ends, as far as they are known.
    pure subroutine set_window(stages, dt, stage, start, end)
       type(run_stages_t), intent(in) :: stages
       !> Time step [s]

@@ -7,6 +7,7 @@ module polydem_contact_loop
    use omp_lib, only: omp_get_max_threads
    use polydem_bodies, only: bodies_t
    use polydem_clock, only: wall_seconds
+   use polydem_cell_load, only: add_virial
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: index_contacts
@@ -81,6 +82,10 @@ contains
       call gather_results(n, .not. allocated(self%law%constraint), self%loop, self%contacts)
       associate (ranges => self%loop%ranges(:n))
          self%loop%n_contacts = sum(ranges%n_contacts)
+         self%loop%virial = 0_lp
+         do r = 1_ip, n
+            self%loop%virial = self%loop%virial + ranges(r)%virial
+         end do
          self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%loop%n_contacts, lp)
          self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(sum(ranges%n_degenerate), lp)
       end associate
@@ -144,6 +149,8 @@ contains
          end if
          call add_terms(block, terms, last(2), self%loop%force_sums, self%loop%ranges(r)%late)
          call count_block(self%domain%has_halo(), self%bodies, block, self%loop%ranges(r))
+         if (allocated(self%bodies%cell%load)) &
+            call count_virial(self%domain%has_halo(), self%bodies, block, terms, self%loop%ranges(r)%virial)
          call keep_contacts(r, self%bodies, block, terms, self%history, self%loop)
          call own_clock%end_part(2)
       end do
@@ -168,6 +175,7 @@ contains
          results%n_contacts = 0_ip
          results%n_degenerate = 0_ip
          results%passing_pair = 0_ip
+         results%virial = 0_lp
       end associate
    end subroutine start_results
 
@@ -209,6 +217,21 @@ contains
       results%n_degenerate = results%n_degenerate &
                              + count(owned(:block%n) .and. block%degenerate(:block%n) > 0.0_wp, kind=ip)
    end subroutine count_block
+
+   !> Add the contacts that this rank owns to the sums for a cell that yields.
+   pure subroutine count_virial(has_halo, bodies, block, terms, virial)
+      !> Whether other ranks own some of the bodies
+      logical, intent(in) :: has_halo
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      type(contact_terms_t), intent(in) :: terms
+      integer(lp), intent(inout) :: virial(2, 3)
+      logical :: owned(block_size)
+
+      owned = .true.
+      if (has_halo) call find_owned_pairs(block%n, block%first, block%second, bodies%in_halo, bodies%fixed, owned)
+      call add_virial(bodies%cell%load%unit, block, terms, owned, virial)
+   end subroutine count_virial
 
    !> Join the results of n ranges.
    subroutine gather_results(n, releases_rows, loop, contacts)

@@ -5,7 +5,7 @@ module polydem_predict
    use polydem_bodies, only: block_size, bodies_t
    use polydem_body_motion, only: body_motion_t
    use polydem_body_runs, only: find_run, list_others, number_of_parts
-   use polydem_bodies_in_cell, only: wrap_bodies
+   use polydem_bodies_in_cell, only: stretch_bodies, wrap_bodies
    use polydem_boxes_within, only: have_boxes_within
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t
@@ -151,8 +151,9 @@ contains
       end do
    end subroutine predict_block
 
-   !> Return those of up to `block_size` bodies to the cell that have left it. What a sheared border changes of their
-   !> momentum and kinetic energy is the work of the border, and counts as that of a wall.
+   !> Return those of up to `block_size` bodies to the cell that have left it, and stretch their places with a cell that
+   !> yields. What this changes of their momentum and kinetic energy is the work of the cell, and counts as that of a
+   !> wall.
    subroutine return_to_cell(dt, slots, bodies, balance)
       !> Time step [s]
       real(wp), intent(in) :: dt
@@ -161,20 +162,24 @@ contains
       type(bodies_t), intent(inout) :: bodies
       !> Balance of energy; not started if the run computes none
       type(energy_balance_t), intent(inout) :: balance
-      real(wp) :: former(block_size), change
+      real(wp) :: former(2, block_size), change(2)
       integer(ip) :: k
+      logical :: changes
 
-      if (bodies%cell%is_sheared) former(:size(slots)) = bodies%velocity(1, slots)
+      changes = bodies%cell%is_sheared .or. allocated(bodies%cell%load)
+      if (changes) former(:, :size(slots)) = bodies%velocity(:, slots)
+      if (allocated(bodies%cell%load)) call stretch_bodies(bodies, slots)
       call wrap_bodies(bodies, slots)
-      if (.not. (bodies%cell%is_sheared .and. allocated(balance%wall_sum))) return
+      if (.not. (changes .and. allocated(balance%wall_sum))) return
       do k = 1_ip, size(slots, kind=ip)
-         associate (m => bodies%mass(slots(k)), v => bodies%velocity(1, slots(k)), &
+         associate (m => bodies%mass(slots(k)), v => bodies%velocity(:, slots(k)), &
                     wall_sum => balance%wall_sum(:, slots(k)))
-            change = v - former(k)
-            if (.not. abs(change) > 0.0_wp) cycle
-            wall_sum(1) = wall_sum(1) + 0.5_wp*m*change*(v + former(k))/dt
-            wall_sum(2) = wall_sum(2) + m*change/dt
-            wall_sum(5) = wall_sum(5) + abs(m*change)/dt
+            change = v - former(:, k)
+            if (.not. any(abs(change) > 0.0_wp)) cycle
+            wall_sum(1) = wall_sum(1) + (0.5_wp*m*change(1)*(v(1) + former(1, k)) &
+                                         + 0.5_wp*m*change(2)*(v(2) + former(2, k)))/dt
+            wall_sum(2:3) = wall_sum(2:3) + m*change/dt
+            wall_sum(5) = wall_sum(5) + (abs(m*change(1)) + abs(m*change(2)))/dt
          end associate
       end do
    end subroutine return_to_cell

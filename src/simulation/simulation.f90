@@ -17,12 +17,12 @@ module polydem_simulation
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
    use polydem_traffic, only: traffic_t
-   use polydem_wall_energy, only: add_loads
+   use polydem_wall_energy, only: add_cell, add_loads
    use polydem_walls, only: walls_t
    use polydem_thread_results, only: loop_results_t
    implicit none
    private
-   public :: simulation_t, relaxation_t, former_direction, time_of, compute_balance
+   public :: simulation_t, relaxation_t, former_direction, time_of, acts_on_all, compute_balance
    public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: contacts, pairs that began, pairs that ended, contacts without direction
@@ -129,6 +129,15 @@ contains
       time_of = real(self%step, wp)*self%dt
    end function time_of
 
+   !> Whether a step leaves nothing out for bodies that nothing touches: forces act on all bodies, or the border of a
+   !> sheared cell, or a cell that yields; or bodies have several pieces, of which pairs are made
+   pure logical function acts_on_all(self)
+      type(simulation_t), intent(in) :: self
+
+      acts_on_all = self%body_forces%act() .or. self%bodies%cell%is_sheared .or. &
+                    allocated(self%bodies%cell%load) .or. self%bodies%pieces%most > 1_ip
+   end function acts_on_all
+
    !> Evaluate the energy and momentum balance; collective.
    subroutine compute_balance(self, balance)
       !> The simulation at the end of a step, with `output.energy_balance` on
@@ -138,6 +147,9 @@ contains
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
                             self%loop%force_sums, self%loop%walls, balance)
+      if (allocated(self%bodies%cell%load)) call add_cell( &
+         self%energy_balance, self%dt*(self%bodies%cell%load%power_sum - 0.5_wp*self%bodies%cell%load%power), &
+         self%loop%walls%energy_is_known, balance)
       if (allocated(self%walls%loads)) call add_loads(self%energy_balance, self%walls%energies(self%dt), balance)
    end subroutine compute_balance
 

@@ -1,10 +1,11 @@
 !> The time step of a simulation.
 module polydem_time_step
    use polydem_bodies, only: turn_bodies
-   use polydem_cell, only: shear_cell
+   use polydem_bodies_in_cell, only: change_cell
    use polydem_box_images, only: place_images
    use polydem_box_maker, only: turn_and_bound
    use polydem_boxes_within, only: have_boxes_within
+   use polydem_cell_load, only: yield_cell
    use polydem_complete, only: complete_step
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_loop, only: loop_over_contacts
@@ -44,7 +45,8 @@ contains
       if (allocated(error)) return
       self%step = self%step + 1_lp
       call begin_step(self%energy_balance)
-      call shear_cell(self%bodies%cell, real(self%step - 1_lp, wp)*self%dt, time_of(self))
+      call change_cell(self%dt, real(self%step - 1_lp, wp)*self%dt, time_of(self), self%bodies)
+      call check_cell(self, error)
       associate (timers => self%timers, domain => self%domain)
          call timers%start()
          if (domain%has_halo()) then
@@ -75,15 +77,32 @@ contains
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
          ! Loads need all ranks.
-         if (self%settings%overlap%degenerate == 'stop' .or. allocated(self%walls%loads)) &
-            call self%comm%all_reduce_error(error)
+         if (self%settings%overlap%degenerate == 'stop' .or. allocated(self%walls%loads) &
+             .or. allocated(self%bodies%cell%load)) call self%comm%all_reduce_error(error)
          if (allocated(error)) return
          if (allocated(self%walls%loads)) call self%walls%yield(self%comm, self%dt, time_of(self), &
                                                                    self%bodies, self%loop%walls)
+         if (allocated(self%bodies%cell%load)) &
+            call yield_cell(self%comm, self%dt, time_of(self), self%loop%virial, self%bodies%cell)
          call complete_step(self, error)
          call timers%lap(stage_integrate)
       end associate
    end subroutine advance
+
+   !> Check that a cell that yields is large enough for its bodies. All ranks find the same.
+   subroutine check_cell(self, error)
+      type(simulation_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (cell => self%bodies%cell)
+         if (.not. allocated(cell%load)) return
+         if (all(cell%size > cell%load%least)) return
+         call raise(error, run_error, 'step '//to_text(self%step)//': the cell has shrunk to '// &
+                    to_text(cell%size(1))//' x '//to_text(cell%size(2))//' m, but the largest body needs more than '// &
+                    to_text(cell%load%least)//' m, twice its diameter. Start with more bodies, or reduce the '// &
+                    'stress in &cell')
+      end associate
+   end subroutine check_cell
 
    !> Update vertices and boxes of all but the free bodies, and all images.
    subroutine bound_others(self, has_left, error)
@@ -100,6 +119,7 @@ contains
       if (.not. self%bodies%cell%is_periodic) return
       call place_images(self%search%maker%images, self%bodies%cell, self%search%boxes)
       if (.not. allocated(self%domain%reference)) return
+      has_left = has_left .or. self%domain%is_off(self%bodies%cell)
       do k = 1, size(self%walls%driven)
          has_left = has_left .or. .not. have_boxes_within( &
             self%search%maker, self%walls%driven(k)%slots, self%search%boxes, self%domain%rank_bounds%zone, &

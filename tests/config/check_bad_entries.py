@@ -171,6 +171,8 @@ def with_required(row):
         if entries.get("direction") == "angle":
             entries["torque"] = "1"
         groups = {**({"grains": parts["grains"]} if row.group == "cell" else parts), row.group: entries}
+        if row.group == "cell":
+            groups["forces"] = {"gravity": "0, 0"}
         if entries.get("until") == "stress":
             groups["sample"] = {"area": "rectangle", "low": "0, 0", "high": "1, 1"}
         yield {**{entry_of(group, name): value for group, given in groups.items()

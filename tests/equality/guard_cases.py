@@ -79,6 +79,7 @@ TRAFFIC = tuple(f"{group}.{NAME}.{key}" for group, keys in {
     "source": "low high rate count interval stage velocity corners short_axis long_axis diameter width height outline "
               "outline_corners outlines elongation size_spread grading angle size_ratio material density seed",
     "sink": "low high interval stage"}.items() for key in keys.split())
+YIELDING = tuple(f"cell.{key}" for key in "stress stress_ramp mass damping_ratio stage".split())
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
 VARIED = {
     "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.packing": None, "scene.corners_min": "3",
@@ -114,7 +115,8 @@ VARIED = {
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
-    "cell.shear_rate": None, "cell.shear_ramp": None, "wall.one.corners": "6",
+    "cell.shear_rate": None, "cell.shear_ramp": None,
+    **dict.fromkeys(YIELDING, None), "wall.one.corners": "6",
     "motion.one.stage": None, "load.one.stage": None,
     **dict.fromkeys(TRAFFIC, None),
     "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
@@ -177,12 +179,15 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
              **dict.fromkeys(("stage.one.component", "sample.sides", "sample.ends"), "test_time_series.py"),
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
-             "cell.shear_ramp": "as cell.shear_rate", "grains.one.packing": "as scene.packing",
+             "cell.shear_ramp": "as cell.shear_rate",
+             **dict.fromkeys(YIELDING, "tests/ranks: scene yielding"),
+             "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack", "grains.one.outlines": "test_shapes.pf",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
-UNTRIED = {*(("source.one.shape", shape) for shape in ("regular", "random", "rectangle", "outline")),
+UNTRIED = {*(("cell.obeys", axes) for axes in ("x", "y", "xy")),
+           *(("source.one.shape", shape) for shape in ("regular", "random", "rectangle", "outline")),
            *(("source.one.sizes", sizes) for sizes in ("log_normal", "grading")),
            ("grains.one.shape", "outline"), ("grains.one.arrangement", "voronoi"),
            ("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),

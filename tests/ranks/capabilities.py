@@ -21,6 +21,10 @@ CHANNEL = """\
 """
 CELL = "&cell periodic = 'xy' low = -0.05, -0.05 size = 0.1, 0.1 /\n"
 SHEARED = CELL.replace("/", "shear_rate = 60 shear_ramp = 5e-3 profile = .true. /")
+YIELDING = CELL.replace("/", "obeys = 'xy' stress = 1e4, 2e4 mass = 0.02 damping_ratio = 0.5 /")
+
+#: Cells without walls
+WITHOUT_WALLS = (CELL, SHEARED, YIELDING)
 
 #: Grains in the lower and in the upper half
 GRAINS = """\
@@ -52,6 +56,7 @@ CAPABILITIES = {
     "channel": Capability(container=CHANNEL),
     "cell": Capability(container=CELL),
     "shear": Capability(container=SHEARED),
+    "yielding": Capability(container=YIELDING),
     "materials": Capability(
         groups="&material name = 'hard' stiffness = 8e5 restitution = 0.9 friction_coefficient = 0.1 /\n"
                "&material name = 'soft' density = 900 restitution = 0.3 friction_coefficient = 0.8 /\n"
@@ -96,6 +101,9 @@ CAPABILITIES = {
 #: Pairs that the program refuses, and a part of its message
 REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
+    ("exact_friction", "yielding"): "does not know how the cell grows",
+    ("stages", "yielding"): "needs gravity = 0, 0",
+    ("traffic", "yielding"): "do not move with the cell",
     ("exact_friction", "local_damping"): "whose forces depend on the motion without it",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",
@@ -108,7 +116,7 @@ def pairs():
     """All pairs of names that make a scene: no two containers, no wall that a cell lacks."""
     for two in combinations(sorted(CAPABILITIES), 2):
         chosen = [CAPABILITIES[name] for name in two]
-        without_walls = any(part.container in (CELL, SHEARED) for part in chosen)
+        without_walls = any(part.container in WITHOUT_WALLS for part in chosen)
         if all(part.container for part in chosen) or (without_walls and any(part.needs_walls for part in chosen)):
             continue
         yield two
@@ -122,7 +130,7 @@ def text(names):
         return " ".join(value for value in (getattr(part, entry) for part in chosen) if value)
 
     container = joined("container") or BOX
-    gravity = "0, 0" if container in (CELL, SHEARED) else "0, -40"
+    gravity = "0, 0" if container in WITHOUT_WALLS else "0, -40"
     duration = "" if "stages" in names else "duration = 0.02"
     return (container.format(wall=joined("wall")) + GRAINS.format(lower=joined("lower"), upper=joined("upper"))
             + "".join(part.groups for part in chosen)

@@ -89,6 +89,15 @@ SCENES = {
 &forces gravity = 0, 0 stiffness = 1e6 /
 &integrate safety_factor = 0.1 duration = 0.02 /
 """,
+    # A cell that yields to a stress across the shear: it shrinks by a third.
+    "yielding": """\
+&cell periodic = 'xy' low = -0.05, -0.03 size = 0.1, 0.1 shear_rate = 60 profile = .true.
+   obeys = 'y' stress = 0, 2e4 mass = 0.02 damping_ratio = 0.5 /
+&grains name = 'sample' region = 'box' low = -0.05, -0.03 high = 0.05, 0.07 number = 70 arrangement = 'spread'
+   speed = 1 spin = 50 momentum = 'zero' /
+&forces gravity = 0, 0 stiffness = 1e6 /
+&integrate safety_factor = 0.1 duration = 0.02 /
+""",
     # A chute: grains slide over a rough base that moves itself, and a shaking floor that spans the cell.
     "chute": """\
 &cell periodic = 'x' low = 0.1, 0 size = 0.2, 0 /

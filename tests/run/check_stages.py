@@ -27,6 +27,9 @@ SCENE = """\
 """
 #: The same walls in a scene that starts from a result
 FOUND = "".join(f"&wall name = '{name}' outline = 'result' /\n" for name in ("floor", "left", "right", "lid"))
+#: Grains in a cell
+GAS = ("&grains name = 'gas' region = 'box' low = 0, 0 high = 0.1, 0.1 number = 60 arrangement = 'spread' "
+       "speed = 0.5 /\n")
 OUTPUT = """\
 &integrate dt = 3.0517578125e-5 {duration} {scheme} /
 &output frame_interval = 1e-3 frames_per_segment = 5 contacts = .true. /
@@ -124,6 +127,22 @@ def a_frame_is_a_start_without_history(case):
     assert "no_frame.nml:1: 'start_from' in &scene: film has no frame 999" in message, message
 
 
+def a_cell_that_obeyed_a_stress_keeps_its_size(case):
+    """Finds a start with bodies that a cell of another size folds back over each other."""
+    cell = "&cell periodic = 'xy' size = {size} {entries} /\n"
+    rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 0.015625", scheme="")
+    case.run(cell.format(size="0.1, 0.1", entries="obeys = 'xy' stress = 2e4, 1e4 mass = 0.02") + GAS + rest, "pressed")
+    for origin in ("pressed", "pressed:9"):
+        scene = f"&scene name = 'result' start_from = '{origin}' /\n"
+        message = case.run(cell.format(size="0.1, 0.1", entries="") + scene + rest, "as_before", code=BAD_INPUT)
+        assert "as_before.nml:1: 'size' in &cell: the cell of" in message, message
+        size = re.search(r"size = (\S+, \S+)", message).group(1)
+        assert all(0.02 < float(side) < 0.099 for side in size.split(", ")), message
+        output = case.run(cell.format(size=size, entries="") + scene + rest, "smaller")
+        deepest = re.search(r"the deepest (\S+) of", output)
+        assert deepest is None or float(deepest.group(1)) < 0.05, output
+
+
 def conditions_end_stages_alike_everywhere(case, seeds=2):
     """Finds decisions that depend on ranks, threads, finders or restarts."""
     for seed in range(1, seeds + 1):
@@ -215,6 +234,7 @@ def faults_are_named(case):
 
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
+         a_cell_that_obeyed_a_stress_keeps_its_size,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
 

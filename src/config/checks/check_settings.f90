@@ -203,7 +203,29 @@ contains
       end do
       if (settings%output%trace_steps > 0) call blame(instances(index_of_instance(instances, 'output')), &
          'trace_steps', 'must be 0 in a periodic cell, where the number of boxes changes', error)
+      if (settings%cell%obeys /= 'none') call check_yielding_cell(settings, instances, error)
    end subroutine check_cell
+
+   !> Check what cannot be combined with a cell whose size obeys a stress.
+   pure subroutine check_yielding_cell(settings, instances, error)
+      type(settings_t), intent(in) :: settings
+      type(instance_t), intent(in) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      associate (cell => instances(index_of_instance(instances, 'cell')))
+         if (abs(settings%cell%shear_rate) > 0.0_wp .and. scan(settings%cell%obeys, 'x') > 0) call blame(cell, &
+            'obeys', 'must be ''y'' in a sheared cell', error)
+         if (any(abs(settings%forces%gravity) > 0.0_wp)) call blame(cell, 'obeys', &
+            'needs gravity = 0, 0 in &forces, since a cell without walls falls with what it has', error)
+         do k = 1, size(settings%stage)
+            if (any(abs(settings%stage(k)%gravity) > 0.0_wp)) call blame(cell, 'obeys', &
+               'needs gravity = 0, 0 in all stages, since a cell without walls falls with what it has', error)
+         end do
+         if (size(settings%source) + size(settings%sink) > 0) call blame(cell, 'obeys', &
+            'cannot be combined with &source and &sink, whose regions do not move with the cell', error)
+      end associate
+   end subroutine check_yielding_cell
 
    !> Raise an error about an entry.
    pure subroutine blame(instance, key, text, error)

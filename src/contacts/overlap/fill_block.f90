@@ -102,6 +102,7 @@ contains
       if (is_compound) call refer_to_bodies(bodies, block)
       call copy_motion(bodies, block)
       if (bodies%cell%is_sheared) call add_jumps(bodies, block)
+      if (allocated(bodies%cell%load)) call add_stretching(bodies, block)
       call find_rates_and_directions(block)
       if (.not. all_certified) call direct_from_centres(bodies, block)
    end subroutine fill
@@ -304,6 +305,20 @@ contains
          end associate
       end do
    end subroutine add_jumps
+
+   !> Add to the velocities of the second bodies that with which the growing cell moves them away from the first.
+   pure subroutine add_stretching(bodies, block)
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(inout) :: block
+      real(wp) :: rate(2)
+      integer(ip) :: c
+
+      rate = bodies%cell%load%speed/bodies%cell%size
+      do c = 1_ip, block%n
+         block%velocity_second(c, :) = block%velocity_second(c, :) &
+                                       + rate*(block%arm_first(c, :) - block%arm_second(c, :))
+      end do
+   end subroutine add_stretching
 
    !> Compute the rates of change of the areas, and find the directions from the second bodies to the first.
    pure subroutine find_rates_and_directions(block)

@@ -48,6 +48,12 @@ contains
       call blocks%to_blocks(comm, transpose(int(bodies%image, lp)), images)
       call file%write('/frames/image', int(images, ip), error, '1', &
                       'cells crossed: position + image*size is the path without the cell', part, rows=rows)
+      if (allocated(bodies%cell%load)) then
+         call file%write('/frames/cell_low', real(bodies%cell%low, dp), error, 'm', &
+                         'lower left corner of the periodic cell', rows=one_row)
+         call file%write('/frames/cell_size', real(bodies%cell%size, dp), error, 'm', &
+                         'its width and height', rows=one_row)
+      end if
       if (.not. allocated(bodies%slid)) return
       call blocks%to_blocks(comm, reshape(real(bodies%slid, dp), [1_ip, bodies%n]), block)
       call file%write('/frames/slid', component(block, 1), error, 'm', &

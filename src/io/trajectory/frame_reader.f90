@@ -11,7 +11,7 @@ module polydem_frame_reader
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: find_frame, list_frame
+   public :: find_frame, list_frame, read_cell_size
 
 contains
 
@@ -109,5 +109,31 @@ contains
          end if
       end do
    end subroutine list_frame
+
+   !> Read the size of a cell that obeys a stress, from a checkpoint or a frame of a segment.
+   subroutine read_cell_size(path, row, size, error)
+      !> Path of the checkpoint or segment
+      character(len=*), intent(in) :: path
+      !> Number of frames before this one in the segment
+      integer(lp), intent(in) :: row
+      !> Width and height; 0 if the size of the cell is constant, or there is none [m]
+      real(wp), intent(out) :: size(2)
+      !> Names the file and what is wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      real(dp), allocatable :: values(:), rows(:, :)
+
+      size = 0.0_wp
+      call file%open(path, error)
+      if (allocated(error)) return
+      if (file%has('/run/cell', error)) then
+         call file%read('/run/cell', values, error)
+      else if (file%has('/frames/cell_size', error)) then
+         call file%read('/frames/cell_size', rows, error, rows=[row, 1_lp])
+         if (.not. allocated(error)) values = rows(:, 1)
+      end if
+      call file%close(error)
+      if (allocated(values) .and. .not. allocated(error)) size = real(values(1:2), wp)
+   end subroutine read_cell_size
 
 end module polydem_frame_reader

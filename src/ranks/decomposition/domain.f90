@@ -40,6 +40,8 @@ module polydem_domain
       real(wp) :: most = huge(1.0_wp)
       !> Width and height of the periodic cell, 0 along an axis that is not periodic [m]
       real(wp) :: period(2) = 0.0_wp
+      !> Part of the margin that is left to the growth of a cell that yields; the other one is left to the boxes
+      real(wp) :: growth = 0.0_wp
       !> Median diameter of the free bodies of the run [m]
       real(wp) :: median_diameter = 0.0_wp
       !> Number of halo bodies and images of all ranks per body of the run
@@ -67,6 +69,9 @@ module polydem_domain
       procedure :: choose_margin
       procedure :: set_reference
       procedure :: forget_halo
+      procedure :: follow_cell
+      procedure :: is_off
+      procedure :: shrink_zone
       procedure :: adapt_margin
       procedure :: send_border
       procedure :: count_halo
@@ -87,6 +92,8 @@ module polydem_domain
    !> Greatest margin over the side of a periodic cell. Bodies reach at most a quarter of the side, so all padded boxes
    !> together are shorter than two sides, and only the next copies of a box can meet them
    real(wp), parameter :: share_of_cell = 0.125_wp
+   !> Part of the margin that is left to the growth of a cell
+   real(wp), parameter :: share_of_growth = 0.25_wp
 
 contains
 
@@ -105,9 +112,8 @@ contains
       domain%margin = settings%margin
       if (settings%margin <= 0.0_wp) domain%margin = first_margin*median_diameter
       if (present(cell)) then
-         domain%period = cell%size
-         if (cell%is_periodic) domain%most = share_of_cell*minval(cell%size, cell%size > 0.0_wp)
-         domain%margin = min(domain%margin, domain%most)
+         if (allocated(cell%load)) domain%growth = share_of_growth
+         call domain%follow_cell(cell)
       end if
       if (comm%size > 1_ip .or. any(domain%period > 0.0_wp)) allocate (domain%partition)
    end subroutine new_domain
@@ -162,10 +168,38 @@ contains
 
       if (allocated(self%reference)) deallocate (self%reference)
       allocate (self%reference(4, size(bounds, 2)))
-      self%reference(1:2, :) = bounds(1:2, :) - self%margin
-      self%reference(3:4, :) = bounds(3:4, :) + self%margin
+      self%reference(1:2, :) = bounds(1:2, :) - (1.0_wp - self%growth)*self%margin
+      self%reference(3:4, :) = bounds(3:4, :) + (1.0_wp - self%growth)*self%margin
       self%last_step = step
    end subroutine set_reference
+
+   !> Take the size of the cell, with which the next redistribution finds the copies of boxes.
+   pure subroutine follow_cell(self, cell)
+      class(domain_t), intent(inout) :: self
+      type(cell_t), intent(in) :: cell
+
+      self%period = cell%size
+      if (.not. cell%is_periodic) return
+      self%most = share_of_cell*minval(cell%size, cell%size > 0.0_wp)
+      self%margin = min(self%margin, self%most)
+   end subroutine follow_cell
+
+   !> Whether the size of the cell differs from that of the last redistribution by more than the margin allows
+   pure logical function is_off(self, cell)
+      class(domain_t), intent(in) :: self
+      type(cell_t), intent(in) :: cell
+
+      is_off = .false.
+      if (self%growth > 0.0_wp) is_off = any(abs(cell%size - self%period) > self%growth*self%margin)
+   end function is_off
+
+   !> Shrink the zone of this rank by what the copies of bodies may move with a cell that yields.
+   pure subroutine shrink_zone(self)
+      class(domain_t), intent(inout) :: self
+
+      if (self%growth > 0.0_wp) self%rank_bounds%zone = self%rank_bounds%zone &
+         + self%growth*self%margin*[1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
+   end subroutine shrink_zone
 
    !> Forget the halo and the padded boxes, since the bodies are others: the next step redistributes them.
    subroutine forget_halo(self)

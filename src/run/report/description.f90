@@ -82,6 +82,7 @@ contains
             text = text//', '//name(axis)//' '//to_text(cell%low(axis))//' to '// &
                to_text(cell%low(axis) + cell%size(axis))//' m'
          end do
+         if (allocated(cell%load)) text = text//'; obeys a stress along '//trim(simulation%settings%cell%obeys)
       end associate
       if (simulation%n_outside == 1_lp) text = text//'; 1 body outside was moved into it'
       if (simulation%n_outside > 1_lp) text = text//'; '//to_text(simulation%n_outside)// &

@@ -9,6 +9,7 @@ module polydem_checkpoint_fields
    use polydem_balance_state, only: serialize_balance, serialize_contributions
    use polydem_begin_stage, only: continue_stages
    use polydem_bodies, only: piece_identifiers
+   use polydem_cell_load, only: serialize_cell
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_errors, only: error_t, input_error, raise
@@ -118,6 +119,7 @@ contains
          if (.not. serializer%is_reading) call find_leaving(s)
          if (allocated(s%traffic)) call s%traffic%serialize(serializer)
          if (allocated(s%walls%loads)) call serialize_loads(s%walls%loads, serializer)
+         if (allocated(s%bodies%cell%load)) call serialize_cell(s%bodies%cell, serializer)
          if (s%settings%output%series_interval > 0.0_wp) then
             call s%walls%record%serialize(serializer)
             call s%series%serialize(serializer)

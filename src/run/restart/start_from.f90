@@ -13,7 +13,7 @@ module polydem_start_from
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
-   use polydem_frame_reader, only: find_frame, list_frame
+   use polydem_frame_reader, only: find_frame, list_frame, read_cell_size
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_replace_bodies, only: settle_bodies
    use polydem_result_files, only: checkpoint_path, n_checkpoints
@@ -147,12 +147,28 @@ contains
          if (allocated(error)) call blame(settings, error)
       end if
       if (.not. allocated(error)) call name_walls(settings, origin%path, named, error)
+      if (.not. allocated(error)) call check_cell_size(settings, origin, error)
       call comm%all_reduce_error(error)
       if (allocated(error)) return
       do s = 1_ip, bodies%n
          if (bodies%fixed(s)) call rest(bodies, s)
       end do
    end subroutine read_start
+
+   !> Check that the cell of the namelist is that of a result whose cell obeyed a stress.
+   subroutine check_cell_size(settings, origin, error)
+      type(settings_t), intent(in) :: settings
+      type(origin_t), intent(in) :: origin
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: size(2)
+
+      call read_cell_size(origin%path, origin%row, size, error)
+      if (allocated(error) .or. .not. all(size > 0.0_wp)) return
+      if (all(abs(settings%cell%size - size) <= 16.0_wp*epsilon(size)*size)) return
+      call raise(error, input_error, place_of(settings, 'cell', 'size')//': ''size'' in &cell: the cell of '// &
+                 origin%path//' has got another size there; write periodic = ''xy'' and size = '// &
+                 to_text(size(1), 17)//', '//to_text(size(2), 17))
+   end subroutine check_cell_size
 
    !> Let a body rest.
    pure subroutine rest(bodies, s)

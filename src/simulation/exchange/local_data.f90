@@ -18,7 +18,7 @@ module polydem_local_data
    use polydem_neighbours, only: restart_neighbours
    use polydem_contact_flags, only: new_flag_limits
    use polydem_settings, only: guards_settings_t
-   use polydem_simulation, only: simulation_t, former_direction
+   use polydem_simulation, only: acts_on_all, former_direction, simulation_t
    use polydem_stable_step, only: stiffest_product
    use polydem_wall, only: wall_t
    implicit none
@@ -50,10 +50,8 @@ contains
       self%loop%n_contacts = 0_ip
       self%loop%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%loop%force_sums)
-      ! The border of a sheared cell acts on bodies that nothing touches.
-      call self%motion%flight%start(self%settings%forces%gravity, &
-                             self%body_forces%act() .or. self%bodies%cell%is_sheared .or. &
-                             self%bodies%pieces%most > 1_ip, self%motion%integrator, self%bodies%n)
+      call self%motion%flight%start(self%settings%forces%gravity, acts_on_all(self), self%motion%integrator, &
+                                    self%bodies%n)
       self%loop%incidence = incidence_t()
       call list_moving(self%bodies, self%walls%driven, self%moving, self%n_moving)
       if (.not. allocated(self%motion%check%choice)) call new_motion_check( &

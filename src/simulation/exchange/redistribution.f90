@@ -71,6 +71,7 @@ contains
       end if
       call self%comm%all_reduce_error(error, request)
       if (allocated(error) .or. request(1) == 0_lp) return
+      call self%domain%follow_cell(self%bodies%cell)
       if (self%domain%last_step < 0_lp) then
          call choose_first_margin(self%comm, self%bodies, self%dt, self%domain)
       else
@@ -257,6 +258,7 @@ contains
 
       call self%domain%rank_bounds%publish(self%comm, own%boxes, self%domain%period, &
                                            self%bodies%cell%is_sheared)
+      call self%domain%shrink_zone()
       call list_needed(self%domain, self%comm, own%boxes, sent, counts)
       sent = own%free(sent)
       call copy_packed(own%bodies, sent, halo)

@@ -2,18 +2,17 @@
 module polydem_choose_step
    use polydem_begin_stage, only: find_last_steps
    use polydem_bodies, only: bodies_t
-   use polydem_communicator, only: communicator_t
+   use polydem_cell_load, only: set_cell_mass
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, sum_exactly
    use polydem_kinds, only: ip, lp, wp
-   use polydem_named_walls, only: named_walls_t
    use polydem_run_duration, only: longest_run
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_wall_load, only: set_masses, wall_load_t, wall_mobilities
+   use polydem_wall_load, only: set_masses, wall_mobilities
    implicit none
    private
    public :: choose_step
@@ -42,8 +41,8 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      if (allocated(self%walls%loads)) &
-         call prepare_loads(self%settings%forces%stiffness, self%bodies, self%comm, self%walls%named, self%walls%loads)
+      call prepare_loads(self)
+      call prepare_cell(self)
       call find_expected_speed(self)
       call stable_step_of_shapes(self%law, self%motion%integrator%stability(), self%bodies, self%expected%speed, &
                                  stable, critical, depth, length, damped, mobility_of_walls(self))
@@ -88,21 +87,53 @@ contains
                                                                  self%n_steps)
       end associate
       call check_rate(self, error)
+      call check_cell_mass(self, error)
    end subroutine choose_step
 
-   !> Set the masses of walls that yield. Collective.
-   subroutine prepare_loads(stiffness, bodies, comm, named, loads)
-      !> Stiffness of the settings [N/m2]
-      real(wp), intent(in) :: stiffness
-      type(bodies_t), intent(in) :: bodies
-      class(communicator_t), intent(inout) :: comm
-      type(named_walls_t), intent(inout) :: named
-      type(wall_load_t), intent(inout) :: loads(:)
+   !> Set the mass of a cell that yields, if there is one. Collective.
+   subroutine prepare_cell(self)
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: total, largest(1)
+
+      if (.not. allocated(self%bodies%cell%load)) return
+      associate (bodies => self%bodies)
+         call sum_exactly(self%comm, bodies%mass(bodies%free), total)
+         largest = 0.0_wp
+         if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
+         call reduce_to_greatest(self%comm, largest)
+         call set_cell_mass(total, self%settings%forces%stiffness, largest(1), bodies%cell%load)
+      end associate
+   end subroutine prepare_cell
+
+   !> Check that a cell that yields is not too light for the step. Its size oscillates at most with the stiffness E of
+   !> its contents, times the ratio of its sides.
+   subroutine check_cell_mass(self, error)
+      type(simulation_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), parameter :: least_steps = 5.0_wp
+      real(wp) :: least
+
+      if (allocated(error) .or. .not. allocated(self%bodies%cell%load)) return
+      associate (cell => self%bodies%cell)
+         least = (least_steps*self%dt)**2*self%settings%forces%stiffness*maxval(cell%size)/minval(cell%size)
+         if (cell%load%mass >= least) return
+         call raise(error, input_error, place_of(self%settings, 'cell', 'mass')//': ''mass'' in &cell: the size '// &
+                    'of a cell of '//to_text(cell%load%mass)//' kg/m oscillates faster than the time step '// &
+                    'resolves; use at least '//to_text(short_number(least*1.1_wp))//' kg/m')
+      end associate
+   end subroutine check_cell_mass
+
+   !> Set the masses of walls that yield, if there are any. Collective.
+   subroutine prepare_loads(self)
+      type(simulation_t), intent(inout) :: self
       real(wp) :: total
 
-      call named%find_slots(bodies)
-      call sum_exactly(comm, bodies%mass(bodies%free), total)
-      call set_masses(loads, named, bodies, total, stiffness)
+      if (.not. allocated(self%walls%loads)) return
+      associate (bodies => self%bodies, walls => self%walls)
+         call walls%named%find_slots(bodies)
+         call sum_exactly(self%comm, bodies%mass(bodies%free), total)
+         call set_masses(walls%loads, walls%named, bodies, total, self%settings%forces%stiffness)
+      end associate
    end subroutine prepare_loads
 
    !> Check the number of steps.

@@ -2,11 +2,13 @@
 module polydem_enter_cell
    use polydem_bodies, only: turn_bodies
    use polydem_bodies_in_cell, only: find_folds, put_into_cell, set_cell
-   use polydem_cell, only: new_cell
+   use polydem_cell, only: cell_t, new_cell
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion_table, only: greatest_values
+   use polydem_run_duration, only: number_of_stage
+   use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
@@ -35,11 +37,13 @@ contains
       associate (bodies => self%bodies, settings => self%settings)
          call set_cell(bodies, new_cell(settings%cell%periodic, settings%cell%low, settings%cell%size, &
                                        settings%cell%shear_rate, settings%cell%shear_ramp))
+         if (settings%cell%obeys /= 'none') call let_yield(settings, bodies%cell)
          call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
          call find_folds(bodies)
          largest = 0.0_wp
          if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
          call reduce_to_greatest(self%comm, largest)
+         if (allocated(bodies%cell%load)) bodies%cell%load%least = 2.0_wp*largest(1) + 4.0_wp*settings%boxes%margin
          do s = 1_ip, bodies%n
             call check_size(self, s, largest(1) + 2.0_wp*settings%boxes%margin, error)
             if (allocated(error)) exit
@@ -70,7 +74,28 @@ contains
       end associate
    end subroutine enter_cell
 
-   !> Check that no constraint on velocities acts in a sheared cell, or with local damping.
+   !> Let the size of the cell obey a stress. Its mass is set later.
+   subroutine let_yield(settings, cell)
+      type(settings_t), intent(in) :: settings
+      type(cell_t), intent(inout) :: cell
+      integer :: axis
+
+      allocate (cell%load)
+      associate (load => cell%load, given => settings%cell)
+         do axis = 1, 2
+            load%yields(axis) = scan(given%obeys, 'xy'(axis:axis)) > 0
+         end do
+         load%stress = given%stress
+         load%ramp = given%stress_ramp
+         load%mass = given%mass
+         load%damping_ratio = given%damping_ratio
+         load%centre = cell%low + 0.5_wp*cell%size
+         load%stage = number_of_stage(settings, given%stage)
+         if (load%stage > 0_ip) load%start = huge(1.0_wp)
+      end associate
+   end subroutine let_yield
+
+   !> Check that no constraint on velocities acts in a sheared cell, in one that yields, or with local damping.
    subroutine check_constraint(self, error)
       !> The simulation with its force law
       type(simulation_t), intent(in) :: self
@@ -80,6 +105,9 @@ contains
       if (self%bodies%cell%is_sheared .and. allocated(self%law%constraint)) call raise(error, input_error, &
          place_of(self%settings, 'cell', 'shear_rate')//': ''shear_rate'' in &cell cannot be combined with this '// &
          '''friction'' in &forces, which does not know the velocity of the border; use cundall_strack')
+      if (allocated(self%bodies%cell%load) .and. allocated(self%law%constraint)) call raise(error, input_error, &
+         place_of(self%settings, 'cell', 'obeys')//': ''obeys'' in &cell cannot be combined with this '// &
+         '''friction'' in &forces, which does not know how the cell grows; use cundall_strack')
       if (self%settings%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
          input_error, place_of(self%settings, 'forces', 'local_damping')//': ''local_damping'' in &forces cannot '// &
          'be combined with this ''friction'', whose forces depend on the motion without it; use drag')
@@ -97,6 +125,12 @@ contains
       integer :: axis
 
       associate (bodies => self%bodies, cell => self%bodies%cell)
+         if (bodies%fixed(s) .and. allocated(cell%load)) then
+            call raise(error, input_error, place_of(self%settings, 'cell', 'obeys')//': ''obeys'' in &cell: body '// &
+               to_text(bodies%id(s))//' is fixed, but a cell whose size obeys a stress can have no fixed bodies')
+            error%place = int(bodies%global_index(s), lp)
+            return
+         end if
          if (bodies%fixed(s) .and. cell%is_sheared) then
             call raise(error, input_error, place_of(self%settings, 'cell', 'shear_rate')//': ''shear_rate'' in '// &
                '&cell: body '//to_text(bodies%id(s))//' is fixed, but a sheared cell can have no fixed bodies')

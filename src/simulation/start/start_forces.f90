@@ -1,6 +1,7 @@
 !> Forces and accelerations at time 0.
 module polydem_start_forces
    use polydem_bodies, only: bodies_t
+   use polydem_cell_load, only: yield_cell
    use polydem_changed_bodies, only: expect_changes
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: start_energy_balance
@@ -33,6 +34,8 @@ contains
                              self%history)
       if (allocated(self%walls%loads)) call self%walls%yield(self%comm, 0.0_wp, time_of(self), &
                                                                 self%bodies, self%loop%walls)
+      if (allocated(self%bodies%cell%load)) &
+         call yield_cell(self%comm, 0.0_wp, time_of(self), self%loop%virial, self%bodies%cell)
       if (self%settings%output%series_interval > 0.0_wp) &
          call self%walls%record%start(self%walls%named, self%bodies, self%loop%walls)
       if (self%settings%output%energy_balance) call start_energy_balance( &

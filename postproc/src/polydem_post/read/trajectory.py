@@ -366,6 +366,8 @@ class Trajectory:
         if self._bodies[0] != segment.path or (rows.is_ragged and len(file["bodies/id"]) != len(self._bodies[1]["id"])):
             self._bodies = (segment.path, _bodies_in(file))
         bodies = self._bodies[1]
+        if "cell_size" in frames:
+            bodies = {**bodies, "cell_low": frames["cell_low"][row], "cell_size": frames["cell_size"][row]}
         kept = rows.kept(row, bodies["id"])
         if kept is not None:
             bodies = _chosen(kept, bodies)
