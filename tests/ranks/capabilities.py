@@ -21,7 +21,7 @@ CHANNEL = """\
 """
 CELL = "&cell periodic = 'xy' low = -0.05, -0.05 size = 0.1, 0.1 /\n"
 SHEARED = CELL.replace("/", "shear_rate = 60 shear_ramp = 5e-3 profile = .true. /")
-YIELDING = CELL.replace("/", "obeys = 'xy' stress = 1e4, 2e4 mass = 0.02 damping_ratio = 0.5 /")
+YIELDING = CELL.replace("/", "obeys = 'xy' stress = 2e4, 3e4 mass = 0.1 damping_ratio = 0.5 /")
 
 #: Cells without walls
 WITHOUT_WALLS = (CELL, SHEARED, YIELDING)

@@ -132,13 +132,13 @@ def a_cell_that_obeyed_a_stress_keeps_its_size(case):
     cell = "&cell periodic = 'xy' size = {size} {entries} /\n"
     rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 0.015625", scheme="")
     case.run(cell.format(size="0.1, 0.1", entries="obeys = 'xy' stress = 2e4, 1e4 mass = 0.02") + GAS + rest, "pressed")
-    for origin in ("pressed", "pressed:9"):
+    for folder, origin in (("smaller", "pressed"), ("as_frame", "pressed:9")):
         scene = f"&scene name = 'result' start_from = '{origin}' /\n"
         message = case.run(cell.format(size="0.1, 0.1", entries="") + scene + rest, "as_before", code=BAD_INPUT)
         assert "as_before.nml:1: 'size' in &cell: the cell of" in message, message
         size = re.search(r"size = (\S+, \S+)", message).group(1)
         assert all(0.02 < float(side) < 0.099 for side in size.split(", ")), message
-        output = case.run(cell.format(size=size, entries="") + scene + rest, "smaller")
+        output = case.run(cell.format(size=size, entries="") + scene + rest, folder)
         deepest = re.search(r"the deepest (\S+) of", output)
         assert deepest is None or float(deepest.group(1)) < 0.05, output
 
