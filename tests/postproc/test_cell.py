@@ -137,3 +137,22 @@ def test_fields_cover_the_cell_and_know_its_copies(trajectory):
     assert fields.density.sum() * fields.cell == pytest.approx(frame.mass.sum(), rel=1e-9)
     expected = np.einsum("ci,cj->ij", frame.contacts.force, frame.contacts.branch)
     assert fields.contact_stress.sum(axis=(0, 1)) * fields.cell == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_a_cell_that_obeys_a_stress_has_another_size_in_each_frame(tmp_path):
+    """Finds frames with the size of the start: arms across the border would be as long as the cell."""
+    scene = SCENE.replace("size = 0.06, 0.05", "size = 0.06, 0.05 obeys = 'xy' stress = 2e3, 1e3 mass = 0.05")
+    scene = scene.replace("contacts =", "series_interval = 1e-3 contacts =").format(folder=tmp_path / "result")
+    (tmp_path / "pressed.nml").write_text(scene, encoding="utf-8")
+    subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", tmp_path / "pressed.nml"], check=True, stdout=subprocess.PIPE)
+    run = Trajectory(tmp_path / "result")
+    sizes = np.array([frame.cell_size for frame in run])
+    series = run.time_series
+    assert series["sample_width"] == pytest.approx(sizes[:, 0], rel=1e-12)
+    assert series["sample_height"] == pytest.approx(sizes[:, 1], rel=1e-12)
+    assert sizes[0].tolist() == [0.06, 0.05] and np.all(sizes[-1] < [0.059, 0.049])
+    for frame in run:
+        assert frame.cell_low + 0.5 * frame.cell_size == pytest.approx([0.04, 0.025])
+        contacts = frame.contacts
+        for index, arm in ((contacts.first_index, contacts.first_arm), (contacts.second_index, contacts.second_arm)):
+            assert np.all(np.hypot(*arm.T) <= frame.radius[index] + 1e-12)
