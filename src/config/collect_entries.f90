@@ -10,10 +10,24 @@ module polydem_collect_entries
    use polydem_strings, only: lower_case, quoted, suggestion, to_text
    implicit none
    private
-   public :: collect_entries
+   public :: collect_entries, equal_keys
 
    !> Greatest number of characters of an override in a message
    integer, parameter :: longest_name = 200
+
+   !> Keys of &scene that another group calls otherwise: key, group, key of that group
+   character(len=16), parameter :: equal_keys(3, 22) = reshape([character(len=16) :: &
+      'bodies', 'grains', 'number', &
+      'corners_min', 'grains', 'corners', 'corners_max', 'grains', 'corners', &
+      'corners_min', 'source', 'corners', 'corners_max', 'source', 'corners', &
+      'corners_min', 'wall', 'corners', 'corners_max', 'wall', 'corners', &
+      'long_axis_min', 'grains', 'long_axis', 'long_axis_max', 'grains', 'long_axis', &
+      'long_axis_min', 'source', 'long_axis', 'long_axis_max', 'source', 'long_axis', &
+      'slope', 'wall', 'angle', 'wall_material', 'wall', 'material', &
+      'motion', 'motion', 'kind', 'motion_bodies', 'motion', 'bodies', 'motion_pivot', 'motion', 'pivot', &
+      'motion_rate', 'motion', 'rate', 'motion_velocity', 'motion', 'velocity', &
+      'motion_amplitude', 'motion', 'amplitude', 'motion_frequency', 'motion', 'frequency', &
+      'motion_start', 'motion', 'start', 'motion_ramp', 'motion', 'ramp'], [3, 22])
 
 contains
 
@@ -166,12 +180,25 @@ contains
             ' is '//new_name(statement)//' today')
       else if (owners /= '') then
          call raise(error, input_error, statement%place//': '//quoted(statement%key)//' is a key of '//owners// &
-            ', not of &'//statement%group)
+            ', not of &'//statement%group//equal_key(statement))
       else
          call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
             statement%group//suggestion(statement%key, keys_of(statement%group)))
       end if
    end subroutine raise_unknown_key
+
+   !> Clause about the key of a group that does what a key of &scene does; empty if there is none
+   pure function equal_key(statement) result(clause)
+      type(statement_t), intent(in) :: statement
+      character(len=:), allocatable :: clause
+      integer :: k
+
+      clause = ''
+      do k = 1, size(equal_keys, 2)
+         if (statement%key /= equal_keys(1, k) .or. statement%group /= equal_keys(2, k)) cycle
+         clause = ', which has '//quoted(trim(equal_keys(3, k)))
+      end do
+   end function equal_key
 
    !> Clause about a key that has another name today; empty for others
    pure function new_name(statement) result(clause)

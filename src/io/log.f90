@@ -22,25 +22,26 @@ module polydem_log
 
    !> A log, open for writing
    type :: log_t
-      private
+      !> Number of warnings since it was opened
+      integer(lp) :: warnings = 0_lp
       !> The screen; closed for a quiet log
-      type(line_writer_t) :: screen
+      type(line_writer_t), private :: screen
       !> The file log.txt; closed if there is none
-      type(line_writer_t) :: file
+      type(line_writer_t), private :: file
       !> Whether only the progress line, and no other, is shown on the screen
-      logical :: is_brief = .false.
+      logical, private :: is_brief = .false.
       !> Whether the screen is an interactive terminal and shows a progress line
-      logical :: is_interactive = .false.
+      logical, private :: is_interactive = .false.
       !> Length of the progress line on the screen
-      integer :: live_length = 0
+      integer, private :: live_length = 0
       !> Wall-clock time of the last update of the progress line [s]
-      real(dp) :: live_seconds = 0.0_dp
+      real(dp), private :: live_seconds = 0.0_dp
       !> Whether the heading of the interval lines is written
-      logical :: has_heading = .false.
+      logical, private :: has_heading = .false.
       !> Step of the last interval line
-      integer(lp) :: last_step = 0_lp
+      integer(lp), private :: last_step = 0_lp
       !> Wall-clock time of the last interval line [s]
-      real(dp) :: last_seconds = 0.0_dp
+      real(dp), private :: last_seconds = 0.0_dp
    contains
       procedure :: open => open_log
       procedure :: write_line
@@ -83,6 +84,7 @@ contains
       !> The text, without the last line end
       character(len=*), intent(in) :: text
 
+      if (index(text, 'warning: ') == 1) self%warnings = self%warnings + 1_lp
       if (self%live_length > 0) call write_live(self, repeat(' ', self%live_length))
       if (self%live_length > 0) call self%screen%put(achar(13))
       self%live_length = 0

@@ -12,7 +12,7 @@ module polydem_check
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
-   use polydem_strings, only: to_text
+   use polydem_strings, only: counted, to_text
    use polydem_scene_measures, only: measure_scene, scene_measures_t
    use polydem_thread_choice, only: thread_choice_t
    implicit none
@@ -22,7 +22,8 @@ module polydem_check
 contains
 
    !> Build the scene and print the resolved settings, the models in use, sizes, masses, speeds, time step, memory and
-   !> the warnings of a run at its start. A condition that stops a run at its first step is an error here, too.
+   !> the warnings of a run at its start; the last line is the answer. A condition that stops a run at its first step is
+   !> an error here, too.
    subroutine check_simulation(settings, error, oversubscription, threads)
       type(settings_t), intent(in) :: settings
       !> Allocated for bad input, or if a run stops at its first step
@@ -57,8 +58,24 @@ contains
                           ' KiB each, '// &
                           to_text(real(frames, wp)*real(frame_size(simulation), wp)/1048576.0_wp, 3)//' MiB in total')
       call warn_at_start(simulation, measures, log, error)
+      if (.not. allocated(error)) call log%write_line(answer(simulation, measures%free, log%warnings))
       call log%close(error)
    end subroutine check_simulation
+
+   !> The last line: what would run, and whether something above it needs a look
+   pure function answer(simulation, free, warnings) result(text)
+      type(simulation_t), intent(in) :: simulation
+      !> Number of free bodies, and of warnings
+      integer(lp), intent(in) :: free, warnings
+      character(len=:), allocatable :: text
+
+      text = 'answer     this scene can run: '
+      if (simulation%stages%number > 0) text = text//'at most '
+      text = text//counted(simulation%n_steps, 'step')//' of '//to_text(free)//' free '// &
+         trim(merge('body  ', 'bodies', free == 1_lp))//', '
+      if (warnings == 0_lp) text = text//'no warnings'
+      if (warnings > 0_lp) text = text//counted(warnings, 'warning')//' above'
+   end function answer
 
    !> Write the warnings about the initial state, then apply the guards of a run at step 0.
    subroutine warn_at_start(simulation, measures, log, error)

@@ -7,6 +7,7 @@ module polydem_run_output
    use polydem_monitor, only: check_step, needs_contacts
    use polydem_output_intervals, only: is_due, is_line_due
    use polydem_run, only: run_t
+   use polydem_sample_columns, only: sample_text
    use polydem_series_row, only: collect_row
    use polydem_simulation, only: time_of, compute_balance
    use polydem_simulation_counters, only: count_contacts
@@ -25,6 +26,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: frame_due, line_due
       integer(ip) :: n_contacts
+      character(len=:), allocatable :: text
 
       associate (s => run%simulation)
          frame_due = is_due(s%step, s%n_steps, run%frame_steps)
@@ -42,6 +44,10 @@ contains
                call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, n_contacts)
             end if
             if (s%stages%value >= 0.0_wp) call run%log%write_line('           '//condition_text(s))
+            if (run%series_steps > 0.0_dp) then
+               call sample_text(s, text)
+               call run%log%write_line(text)
+            end if
          end if
          call record_row(run)
          if (frame_due) call write_frame(run, error)
@@ -60,7 +66,7 @@ contains
       associate (s => run%simulation)
          needs_table = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
          if (run%series_steps > 0.0_dp) needs_table = needs_table .or. &
-            is_due(s%step + 1_lp, s%n_steps, run%series_steps)
+            is_due(s%step + 1_lp, s%n_steps, run%series_steps) .or. is_line_due(run, s%step + 1_lp)
          if (s%stages%number > 0_ip) needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
          needs_table = needs_table .or. needs_contacts(run%monitor, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate

@@ -1,4 +1,4 @@
-!> Columns of the series of a run for the whole sample.
+!> Columns of the series of a run for the whole sample, and lines of the log with some of them.
 module polydem_sample_columns
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use polydem_kinds, only: wp
@@ -7,9 +7,10 @@ module polydem_sample_columns
       unbalanced_force
    use polydem_sample_area, only: find_area, has_area, sample_area_t
    use polydem_simulation, only: simulation_t
+   use polydem_strings, only: index_of, to_text
    implicit none
    private
-   public :: set_sample_columns
+   public :: set_sample_columns, sample_text
 
 contains
 
@@ -31,6 +32,35 @@ contains
       call row%set('coordination', value, '1', 'mean number of contacts of a free body')
       if (has_area(simulation)) call set_averages(simulation, row)
    end subroutine set_sample_columns
+
+   !> Write how the sample is: its forces, and with an area its averages there. Collective.
+   subroutine sample_text(simulation, text)
+      !> The simulation with the table of contacts of this step
+      type(simulation_t), intent(inout) :: simulation
+      !> One line, or two with an area
+      character(len=:), allocatable, intent(out) :: text
+      type(named_values_t) :: row
+
+      call set_sample_columns(simulation, row)
+      text = '           unbalanced '//value_of('unbalanced_force')//', coordination '//value_of('coordination')
+      if (has_area(simulation)) text = text//new_line('a')//'           solid fraction '// &
+         value_of('solid_fraction')//', stress xx '//value_of('stress_xx')//', xy '//value_of('stress_xy')// &
+         ', yy '//value_of('stress_yy')//' N/m2, inertial number '//value_of('inertial_number')
+
+   contains
+
+      !> A value of the row; a dash if it is not defined
+      pure function value_of(name) result(value)
+         character(len=*), intent(in) :: name
+         character(len=:), allocatable :: value
+
+         associate (number => real(row%value(index_of(name, row%name)), wp))
+            value = '-'
+            if (abs(number) <= huge(1.0_wp)) value = to_text(number, 3)
+         end associate
+      end function value_of
+
+   end subroutine sample_text
 
    !> Set the columns of averages over the area of the sample. Collective.
    subroutine set_averages(simulation, row)

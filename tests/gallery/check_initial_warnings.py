@@ -35,7 +35,13 @@ def checked(program, path, *settings):
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     for line in ("extent     x ", "sizes      ", "thinnest   body ", "masses     ", "speeds     ", "frames     "):
         assert done.returncode == 2 or f"\n{line}" in done.stdout, (path.name, line, done.stdout)
-    return done.returncode, re.findall(r"^warning: (.*)$", done.stdout, re.MULTILINE), done.stderr
+    told = re.findall(r"^warning: (.*)$", done.stdout, re.MULTILINE)
+    # The last line is the answer; there is none where a run would stop at once.
+    answer = re.match(r"answer     this scene can run: (at most )?\d+ steps? of \d+ free bod(y|ies), (.*)$",
+                      (done.stdout.splitlines() or [""])[-1])
+    counted = f"{len(told)} warning{'s' * (len(told) != 1)} above" if told else "no warnings"
+    assert (answer[3] == counted) if done.returncode == 0 else not answer, (path.name, done.stdout)
+    return done.returncode, told, done.stderr
 
 
 def main():

@@ -45,6 +45,7 @@ OTHERS = {
     "src/algorithms.md",
     "src/packaging/README.md",
     "src/theory.md",
+    "src/theory_motion.md",
     "tests/README.md",
     "tests/faults.md",
     "tests/hard_cases.md",

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import subprocess
 
 import numpy as np
@@ -130,6 +131,35 @@ def test_the_sample_has_the_quantities_of_its_frames(kind, tmp_path):
             scale = np.abs(stress).max() if name.startswith("stress") else 0.0
             np.testing.assert_allclose(series[name][k], value, rtol=1e-9, atol=1e-9 * scale, err_msg=name)
     assert n_pressed > 4
+
+
+def test_lines_of_the_log_have_the_quantities_of_a_row_at_their_step(tmp_path):
+    """Finds lines from the contacts of another step, of other columns, or in a run without a series."""
+    scene = WALLS + GRAINS + "&sample area = 'rectangle' low = -0.03, -0.04 high = 0.04, 0.03 /\n"
+    (tmp_path / "scene.nml").write_text(scene + "&integrate duration = 0.02 /\n", encoding="utf-8")
+
+    def run_of(*entries):
+        words = [word for entry in ("log_interval=1e-3", *entries) for word in ("--set", f"output.{entry}")]
+        done = subprocess.run([PROGRAM, "run", "scene.nml", "--force", *words], cwd=tmp_path, check=True,
+                              capture_output=True, text=True)
+        return done.stdout
+
+    names = ("unbalanced_force", "coordination", "solid_fraction", "stress_xx", "stress_xy", "stress_yy",
+             "inertial_number")
+    number = r"(-|[-+.E\d]+)"
+    line = re.compile(rf"^ +(\d+) .*%\n +unbalanced {number}, coordination {number}\n +solid fraction {number}, "
+                      rf"stress xx {number}, xy {number}, yy {number} N/m2, inertial number {number}$", re.MULTILINE)
+    rare = run_of("series_interval=5e-3")
+    found = {int(step): values for step, *values in line.findall(rare)}
+    assert "unbalanced" not in run_of("series_interval=0")
+    often = run_of("series_interval=1e-3")
+    assert found == {int(step): values for step, *values in line.findall(often)} and len(found) == 21
+    series = Trajectory(tmp_path / "results" / "scene").time_series
+    for k, step in enumerate(series["step"]):
+        for name, value in zip(names, found[int(step)]):
+            expected = series[name][k]
+            assert value == ("-" if np.isnan(expected) else f"{expected:.2E}"), (step, name)
+    assert max(float(values[1]) for values in found.values()) > 0.5
 
 
 def test_a_stress_ends_a_stage(tmp_path):

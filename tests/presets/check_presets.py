@@ -87,10 +87,12 @@ class Presets(unittest.TestCase):
                 if entries.get("POLYDEM_MPI") == "ON" and not has_mpi():
                     print("no MPI: not tried")
                     continue
-                shutil.rmtree(FOLDER / names[0], ignore_errors=True)
                 targets = OF_MPI if "POLYDEM_MPI" in entries else ()
-                self.assertEqual(complaints(SOURCES, entries, FOLDER / names[0], *targets), [])
-                shutil.rmtree(FOLDER / names[0])
+                found = complaints(SOURCES, entries, FOLDER / names[0], *targets)
+                if found:
+                    # What is checked gives no warning again.
+                    shutil.rmtree(FOLDER / names[0])
+                self.assertEqual(found, [])
 
     def test_every_preset_can_be_built_and_is_named_in_the_manual(self):
         listed = json.loads((SOURCES / "CMakePresets.json").read_text(encoding="utf-8"))

@@ -48,6 +48,8 @@ class Capability:
     wall: str = ""
     lower: str = ""
     upper: str = ""
+    #: Longest duration [s]
+    duration: float = 0.02
     #: Whether it needs a floor and a lid
     needs_walls: bool = False
 
@@ -64,7 +66,9 @@ CAPABILITIES = {
                "&scene material = 'hard' /\n",
         wall="material = 'soft'", upper="material = 'soft'"),
     "random_shapes": Capability(lower="shape = 'random' corners = 3, 9 diameter = 5e-3, 7e-3 elongation = 1.5"
-                                      " sizes = 'log_normal' size_spread = 1.1"),
+                                      " sizes = 'log_normal' size_spread = 1.1",
+                                # Thin grains have short steps: several thousand of them
+                                duration=0.006),
     "blocks": Capability(groups="&grains name = 'blocks' region = 'box' low = 0.022, -0.005 high = 0.048, 0.005"
                                 " arrangement = 'voronoi' number = 6 gap = 5e-4 lloyd_steps = 2 speed = 1 /\n"),
     "cohesion": Capability(forces="cohesion = 200"),
@@ -131,7 +135,7 @@ def text(names):
 
     container = joined("container") or BOX
     gravity = "0, 0" if container in WITHOUT_WALLS else "0, -40"
-    duration = "" if "stages" in names else "duration = 0.02"
+    duration = "" if "stages" in names else f"duration = {min(part.duration for part in chosen)}"
     return (container.format(wall=joined("wall")) + GRAINS.format(lower=joined("lower"), upper=joined("upper"))
             + "".join(part.groups for part in chosen)
             + f"&forces gravity = {gravity} stiffness = 4e5 {joined('forces')} /\n"

@@ -32,6 +32,10 @@ ENVIRONMENT = {
     "OMPI_MCA_hwloc_base_binding_policy": "none",
     "OMP_WAIT_POLICY": "passive",
 }
+#: Lets ranks sleep while they wait; built with the tests of the program without MPI
+PATIENCE = Path(SERIAL).resolve().parents[2] / "tests" / "ranks" / "libpatient_ranks.so"
+if PATIENCE.exists():
+    ENVIRONMENT["LD_PRELOAD"] = str(PATIENCE)
 if os.getuid() == 0:
     ENVIRONMENT.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
 

@@ -48,7 +48,7 @@ FAILED, BAD_INPUT, NO_FILE = 1, 2, 3
 def whole(tmp_path_factory):
     """A folder with a namelist, and the result of a run that nobody disturbed."""
     folder = tmp_path_factory.mktemp("whole")
-    write_scene(folder / "scene.nml", "drum", longer=2)
+    write_scene(folder / "scene.nml", "drum")
     output, _ = run(folder / "scene.nml", folder / "whole", None, 1, OPTIONS)
     folder.joinpath("hash").write_text(state_hash(output), encoding="utf-8")
     return folder
@@ -104,7 +104,7 @@ def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole
         before = segments(folder)
         process = start(whole / "scene.nml", folder, chance.choice((2, 3, 4)), 1, ("--continue", *OPTIONS))
         wait_for(lambda: (folder / "running.lock").exists() or process.poll() is not None, process)
-        time.sleep(chance.uniform(0.0, 1.5))
+        time.sleep(chance.uniform(0.0, 1.0))
         victims = ranks_of(process)
         if victims:
             with contextlib.suppress(ProcessLookupError):
@@ -284,7 +284,8 @@ def test_a_warning_of_any_rank_is_told(tmp_path):
 
 def test_warnings_and_their_counts_do_not_depend_on_ranks_or_checkpoints(whole, tmp_path):
     options = ("--set", "guards.displacement=warn", "--set", "guards.displacement_limit=0.02", "--set",
-               "guards.step=warn", "--set", "forces.stiffness=5e3", "--set", "checkpoint.steps=7")
+               "guards.step=warn", "--set", "forces.stiffness=5e3", "--set", "checkpoint.steps=20", "--set",
+               "integrate.duration=0.06")
     told = {}
     for ranks in (None, 2, 3, 4):
         output, _ = run(whole / "scene.nml", tmp_path / f"of_{ranks}", ranks, 1, options)
@@ -366,8 +367,9 @@ def test_variables_of_the_fortran_library_change_nothing(whole, monkeypatch, tmp
 
 def test_more_threads_than_processors_of_all_ranks_together_draw_a_warning(whole, tmp_path):
     processors = len(os.sched_getaffinity(0))
+    short = (*OPTIONS, "--set", "integrate.duration=1e-3")
     for ranks in sorted({1, processors, processors + 1}):
-        output, _ = run(whole / "scene.nml", tmp_path / str(ranks), ranks, 1, OPTIONS)
+        output, _ = run(whole / "scene.nml", tmp_path / str(ranks), ranks, 1, short)
         told = f"warning: more threads than processors ({ranks} on {processors})"
         assert (told in output) == (ranks > processors), output
         assert (told in (tmp_path / str(ranks) / "log.txt").read_text(encoding="utf-8")) == (ranks > processors)

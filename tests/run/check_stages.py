@@ -64,6 +64,8 @@ class Case:
     def __init__(self, program):
         self.program = program
         self.parallel = os.environ.get("POLYDEM_MPI_PROGRAM")
+        #: Lets ranks sleep while they wait
+        self.patience = os.path.join(os.path.dirname(program), "..", "..", "tests", "ranks", "libpatient_ranks.so")
 
     def run(self, text, folder, *options, ranks=None, threads=1, code=0):
         """Run a namelist; return the output, or the message if the run is to fail."""
@@ -78,8 +80,11 @@ class Case:
         command = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", str(ranks), self.parallel] if ranks else [
             self.program]
         command += ["run", f"{folder}.nml", "--threads", str(threads), "--set", f"output.folder={folder}", *options]
+        environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
+        if ranks and os.path.exists(self.patience):
+            environment["LD_PRELOAD"] = self.patience
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL,
-                                text=True, env={**os.environ, "OMP_WAIT_POLICY": "passive"})
+                                text=True, env=environment)
 
 
 def hash_of(output):

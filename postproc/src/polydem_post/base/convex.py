@@ -61,7 +61,8 @@ def _extent(points: FloatArray) -> float:
     for k, run in enumerate(runs):
         reach = np.maximum(high[k] - low[: k + 1], high[: k + 1] - low[k])
         for other in np.flatnonzero(np.hypot(*reach.T) > extent):
-            extent = max(extent, float(np.hypot(*(run[:, None] - runs[other][None]).T).max()))
+            x, y = (np.subtract.outer(one, two) for one, two in zip(run.T, runs[other].T))
+            extent = max(extent, math.sqrt((x * x + y * y).max()))
     return extent
 
 
