@@ -146,8 +146,8 @@ SCENES = {
 &sink name = 'hole' low = -0.02, -1 high = 0.02, 0.02 interval = 150 /
 &sink name = 'draught' low = -0.05, 0.06 high = 0, 0.07 interval = 60 /
 &forces gravity = 0, -80 stiffness = 1e6 drag = 2 /
-&stage name = 'calm' until = 'departed' sink = 'draught' above = 15 longest = 0.04 at_limit = 'next' check = 7 /
-&stage name = 'storm' gravity = 30, -80 duration = 0.02 /
+&stage name = 'calm' until = 'departed' sink = 'draught' above = 4 longest = 1 check = 7 /
+&stage name = 'storm' gravity = 30, -80 duration = 0.01 /
 """,
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\
