@@ -65,6 +65,8 @@ contains
             call count_grains(simulation%bodies, simulation%comm, stage%low, stage%high, value)
          case ('stress')
             call measure_stress(simulation, stage%component, value)
+         case ('departed')
+            value = departures(simulation, stage%sink)
          case ('solid_fraction')
             call solid_fraction(simulation%bodies, simulation%comm, sample_area_t(stage%low, stage%high, &
                                 stage%high - stage%low), value)
@@ -77,6 +79,21 @@ contains
       end associate
       simulation%stages%value = value
    end subroutine measure_condition
+
+   !> Number of bodies that have left since the start of the run, the same on all ranks
+   pure real(wp) function departures(simulation, name)
+      type(simulation_t), intent(in) :: simulation
+      !> Name of a sink; empty: all of them
+      character(len=*), intent(in) :: name
+      integer :: k
+
+      departures = 0.0_wp
+      do k = 1, size(simulation%traffic%sinks)
+         associate (sink => simulation%traffic%sinks(k))
+            if (name == '' .or. name == sink%settings%name) departures = departures + real(sink%departed, wp)
+         end associate
+      end do
+   end function departures
 
    !> Measure the magnitude of a component of the mean stress of the sample. Collective.
    subroutine measure_stress(simulation, component, value)

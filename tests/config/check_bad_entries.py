@@ -161,6 +161,8 @@ def with_required(row):
             entries.update({"wall": f"'{NAME}'", "opposite": f"'{NAME}'"} if until == "strain" else {})
             entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
             entries.update({"component": "xx"} if until == "stress" else {})
+            if until == "departed":
+                entries["above"] = entries.pop("below")
         if row.group == "source":
             entries.update(PARTS["shape"][entries.setdefault("shape", "ellipse")])
             entries.update(PARTS["sizes"][entries.setdefault("sizes", "octaves")])
@@ -173,6 +175,8 @@ def with_required(row):
         groups = {**({"grains": parts["grains"]} if row.group == "cell" else parts), row.group: entries}
         if row.group == "cell":
             groups["forces"] = {"gravity": "0, 0"}
+        if entries.get("until") == "departed":
+            groups["sink"] = REQUIRED["sink"]
         if entries.get("until") == "stress":
             groups["sample"] = {"area": "rectangle", "low": "0, 0", "high": "1, 1"}
         yield {**{entry_of(group, name): value for group, given in groups.items()

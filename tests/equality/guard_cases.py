@@ -121,7 +121,8 @@ VARIED = {
     **dict.fromkeys(TRAFFIC, None),
     "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
-    "stage.one.wall": None, "stage.one.opposite": None, "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
+    "stage.one.wall": None, "stage.one.opposite": None, "stage.one.sink": None,
+    "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
     "stage.one.gravity": "1, -20", "stage.one.friction_scale": "0.5", "stage.one.drag": "2",
     "stage.one.component": None, "sample.low": "-0.05, -0.05", "sample.high": "0.05, 0.05", "sample.sides": None,
     "sample.ends": None,
@@ -131,12 +132,12 @@ VARIED = {
     "forces.tilt_damping": "0.5", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
     "forces.local_damping": "0.3", "forces.shake": "5, 20", "forces.shake_frequency": "50", "forces.turn_rate": "2",
-    "forces.drag": "2", "forces.cohesion": "2e4",
+    "forces.drag": "2", "forces.cohesion": "2e4", "forces.rolling_friction": "0.2", "forces.rolling_damping": "0.8",
     "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
     "wall.one.material": "one", "material.one.density": "1000", "contact_pair.one.materials": "one', 'one",
     **{f"{group}.one.{key}": value for group in ("material", "contact_pair") for key, value in {
         "stiffness": "1e6", "restitution": "0.3", "damping_coefficient": "0.2", "friction_coefficient": "0.6",
-        "tangential_stiffness": "0.5", "cohesion": "2e4"}.items()},
+        "tangential_stiffness": "0.5", "cohesion": "2e4", "rolling_friction": "0.2"}.items()},
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
     "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
     "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
@@ -153,11 +154,13 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           **{name: {"material.one.density": "1000", "material.one.stiffness": "3e5"} for name in (
               "scene.material", "scene.wall_material", "grains.one.material", "wall.one.material")},
           **{f"material.one.{key}": {"scene.material": "one"} for key in (
-              "density", "stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion")},
+              "density", "stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion",
+              "rolling_friction")},
           "material.one.damping_coefficient": {"scene.material": "one", "forces.damping_coefficient": "0.1"},
           **{f"contact_pair.one.{key}": {"material.one.density": "1000", "scene.material": "one",
                                          "contact_pair.one.materials": VARIED["contact_pair.one.materials"]}
-             for key in ("stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion")},
+             for key in ("stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion",
+                         "rolling_friction")},
           "contact_pair.one.materials": {"material.one.density": "1000", "scene.material": "one",
                                          "contact_pair.one.friction_coefficient": "0.6"},
           "contact_pair.one.damping_coefficient": {
@@ -169,11 +172,12 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
           **{f"sample.{key}": {"output.series_interval": "1e-3"} for key in ("area", "low", "high")},
           "forces.shake": {"forces.shake_frequency": "40"}, "forces.shake_frequency": {"forces.shake": "5, 10"},
+          "forces.rolling_damping": {"forces.rolling_friction": "0.2"},
           "output.csv": {"output.series_interval": "1e-3"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
              **dict.fromkeys(("motion.one.stage", "load.one.stage",
-                               "scene.start_from", "stage.one.wall", "stage.one.opposite"),
+                               "scene.start_from", "stage.one.wall", "stage.one.opposite", "stage.one.sink"),
                              "check_stages.py"),
              **dict.fromkeys(TRAFFIC, "tests/ranks: scene flow"),
              **dict.fromkeys(("stage.one.component", "sample.sides", "sample.ends"), "test_time_series.py"),
@@ -191,7 +195,8 @@ UNTRIED = {*(("cell.obeys", axes) for axes in ("x", "y", "xy")),
            *(("source.one.sizes", sizes) for sizes in ("log_normal", "grading")),
            ("grains.one.shape", "outline"), ("grains.one.arrangement", "voronoi"),
            ("wall.one.outline", "bodies"), ("wall.one.outline", "result"), ("scene.name", "result"),
-           ("stage.one.until", "strain"), ("stage.one.until", "stress"), ("sample.area", "walls"),
+           ("stage.one.until", "strain"), ("stage.one.until", "stress"), ("stage.one.until", "departed"),
+           ("sample.area", "walls"),
            ("motion.one.kind", "table"), ("grains.one.arrangement", "packing"),
            ("grains.one.arrangement", "column")}
 

@@ -72,6 +72,7 @@ CAPABILITIES = {
     "blocks": Capability(groups="&grains name = 'blocks' region = 'box' low = 0.022, -0.005 high = 0.048, 0.005"
                                 " arrangement = 'voronoi' number = 6 gap = 5e-4 lloyd_steps = 2 speed = 1 /\n"),
     "cohesion": Capability(forces="cohesion = 200"),
+    "rolling": Capability(forces="rolling_friction = 0.3"),
     "drag": Capability(forces="drag = 4"),
     "local_damping": Capability(forces="local_damping = 0.2"),
     "shaken_gravity": Capability(forces="shake = 30, 20 shake_frequency = 90"),

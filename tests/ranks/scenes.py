@@ -61,8 +61,9 @@ SCENES = {
     # Grains of two materials, of which one is softer and lighter, between walls of a third one, and a pair of its own.
     "materials": """\
 &scene wall_material = 'steel' /
-&material name = 'glass' stiffness = 4e5 restitution = 0.9 friction_coefficient = 0.1 /
-&material name = 'rubber' density = 900 stiffness = 1e5 restitution = 0.3 friction_coefficient = 0.9 cohesion = 300 /
+&material name = 'glass' stiffness = 4e5 restitution = 0.9 friction_coefficient = 0.1 rolling_friction = 0.1 /
+&material name = 'rubber' density = 900 stiffness = 1e5 restitution = 0.3 friction_coefficient = 0.9 cohesion = 300
+   rolling_friction = 0.3 /
 &material name = 'steel' stiffness = 1e6 tangential_stiffness = 0.8 /
 &contact_pair name = 'dust' materials = 'steel', 'rubber' friction_coefficient = 0.05 restitution = 0.7 cohesion = 100 /
 &wall name = 'drum' outline = 'ring' radius = 0.1 segments = 30 thickness = 0.01 /
@@ -154,7 +155,8 @@ SCENES = {
 &sink name = 'hole' low = -0.02, -1 high = 0.02, 0.02 interval = 150 /
 &sink name = 'draught' low = -0.05, 0.06 high = 0, 0.07 interval = 60 /
 &forces gravity = 0, -80 stiffness = 1e6 drag = 2 /
-&integrate duration = 0.04 /
+&stage name = 'calm' until = 'departed' sink = 'draught' above = 4 longest = 1 check = 7 /
+&stage name = 'storm' gravity = 30, -80 duration = 0.01 /
 """,
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\

@@ -221,6 +221,8 @@ def faults_are_named(case):
              "cannot be combined with groups"),
             (whole([stage.format("until = 'count' longest = 1 above = 1 low = 0, 0 high = 0, 1")]),
              "must exceed 'low'"),
+            (whole([stage.format("until = 'departed' longest = 1 above = 1")]), "needs a sink; add a group &sink"),
+            (whole([stage.format("until = 'departed' longest = 1 below = 1")]), "which only grows; give 'above'"),
             (whole([stage.format("until = 'strain' longest = 1 above = 1 wall = 'lid' opposite = 'lid'")]),
              "must be another wall"),
             (whole([stage.format("duration = 1"), STAGES[1].replace("stage = 'press'", "stage = 'two'")]),

@@ -8,8 +8,9 @@ module polydem_check_materials
    public :: check_materials
 
    !> Parameters of contacts that a material may give
-   character(len=*), parameter :: parameters(6) = [character(len=20) :: 'stiffness', 'restitution', &
-      'damping_coefficient', 'friction_coefficient', 'tangential_stiffness', 'cohesion']
+   character(len=*), parameter :: parameters(7) = [character(len=20) :: 'stiffness', 'restitution', &
+      'damping_coefficient', 'friction_coefficient', 'tangential_stiffness', 'cohesion', &
+      'rolling_friction']
 
 contains
 

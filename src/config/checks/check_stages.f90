@@ -67,8 +67,11 @@ contains
             'cannot be combined with ''below''; give only one of them', instances, error)
          if (.not. (stage%below > 0.0_wp .or. stage%above > 0.0_wp)) call blame('stage', stage%name, 'until', &
             '= '//quoted(stage%until)//' needs a limit: give ''below'' or ''above'', for example '// &
-            trim(merge('above = 0.1 ', 'below = 1e-3', stage%until == 'strain')), &
-            instances, error)
+            example_of(stage%until), instances, error)
+         if (stage%until == 'departed' .and. stage%below > 0.0_wp) call blame('stage', stage%name, 'below', &
+            'cannot be combined with until = ''departed'', which only grows; give ''above''', instances, error)
+         if (stage%until == 'departed' .and. size(settings%sink) == 0) call blame('stage', stage%name, 'until', &
+            '= ''departed'' needs a sink; add a group &sink', instances, error)
          if (stage%hold >= stage%longest) call blame('stage', stage%name, 'hold', 'must be less than ''longest''', &
             instances, error)
          if (stage%until == 'strain' .and. stage%wall == stage%opposite) call blame('stage', stage%name, 'opposite', &
@@ -81,6 +84,22 @@ contains
             'must exceed ''low'' along x and y', instances, error)
       end associate
    end subroutine check_stage
+
+   !> An example of a limit
+   pure function example_of(until) result(text)
+      !> Quantity that is compared with it
+      character(len=*), intent(in) :: until
+      character(len=:), allocatable :: text
+
+      select case (until)
+      case ('strain')
+         text = 'above = 0.1'
+      case ('departed')
+         text = 'above = 100'
+      case default
+         text = 'below = 1e-3'
+      end select
+   end function example_of
 
    !> Raise an error about an entry.
    pure subroutine blame(group, name, key, problem, instances, error)

@@ -105,6 +105,8 @@ contains
          call measure_faces(shape, element, outline)
       end do
       element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
+      element%rolling_radius = sqrt(element%radius_square)
+      element%rolling_inertia = bodies%inertia(s) + bodies%mass(s)*element%radius_square
    end subroutine start_contact
 
    !> Vertices of a piece relative to its centroid, (2, vertex) [m]

@@ -18,6 +18,7 @@ module polydem_law_factory
    use polydem_pair_parameters, only: pair_parameters, pair_parameters_t, uniform_parameters
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: restitution_damping_t
+   use polydem_rolling_resistance, only: rolling_resistance_t
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_tilt_damping, only: tilt_damping_t
    implicit none
@@ -65,6 +66,8 @@ contains
             call law%add(damping_onset_t(name='from first touch'), s)
          if (law%pairs%cohesion%greatest() > 0.0_wp) call law%add(cohesion_t(name='cohesion'), s)
          if (s%damping /= 'none' .and. s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
+         if (law%pairs%rolling_friction%greatest() > 0.0_wp) &
+            call law%add(rolling_resistance_t(name='rolling resistance'), s)
          if (law%pairs%friction_coefficient%greatest() > 0.0_wp) then
             if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
             if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)

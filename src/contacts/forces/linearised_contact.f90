@@ -33,6 +33,9 @@ module polydem_linearised_contact
       real(wp) :: tangential_mass = 0.0_wp
       !> Sum of the reciprocal moments of inertia of the free bodies [1/(kg m)]; 0 for an expected contact
       real(wp) :: rotational_mobility = 0.0_wp
+      !> Upper bounds of the reduced radius of the bodies [m] and of their reduced moment of inertia about the contact
+      !> [kg m], for a couple against rolling
+      real(wp) :: rolling_radius = 0.0_wp, rolling_inertia = 0.0_wp
       !> Stiffness against approach and against slip [N/m2], and against tilts [N]
       real(wp) :: normal_stiffness = 0.0_wp, tangential_stiffness = 0.0_wp, tilt_stiffness = 0.0_wp
       !> Dashpot against approach and against slip [N s/m2], and against tilts [N s]

@@ -5,7 +5,8 @@
 !>
 !> * stiffness: harmonic mean, 2 E1 E2/(E1 + E2). Each body deforms as if it were half of the contact, and both halves
 !>   bear the same force;
-!> * restitution and friction coefficient: the smaller one, since the more dissipative and the smoother body decide;
+!> * restitution, friction coefficient and coefficient of rolling friction: the smaller one, since the more dissipative
+!>   and the smoother body decide;
 !> * damping coefficient and ratio of tangential stiffness: arithmetic mean;
 !> * cohesion: geometric mean, so a material without cohesion sticks to none.
 !>
@@ -34,10 +35,12 @@ module polydem_pair_parameters
       type(pair_value_t) :: tangential_stiffness
       !> Attraction per length of a contact [N/m2]
       type(pair_value_t) :: cohesion
+      !> Coefficient of rolling friction mu_r
+      type(pair_value_t) :: rolling_friction
    end type pair_parameters_t
 
    !> Number of parameters
-   integer, parameter :: n_parameters = 6
+   integer, parameter :: n_parameters = 7
 
 contains
 
@@ -56,7 +59,7 @@ contains
       do i = 0_ip, n
          values(:, i) = [settings%forces%stiffness, settings%forces%restitution, settings%forces%damping_coefficient, &
                          settings%forces%friction_coefficient, settings%forces%tangential_stiffness, &
-                         settings%forces%cohesion]
+                         settings%forces%cohesion, settings%forces%rolling_friction]
          if (i == 0_ip) cycle
          associate (material => settings%material(i))
             call take(values(1, i), material%stiffness)
@@ -65,6 +68,7 @@ contains
             call take(values(4, i), material%friction_coefficient)
             call take(values(5, i), material%tangential_stiffness)
             call take(values(6, i), material%cohesion)
+            call take(values(7, i), material%rolling_friction)
          end associate
       end do
       do j = 0_ip, n
@@ -82,6 +86,7 @@ contains
             call take(table(i, j, 4), pair%friction_coefficient)
             call take(table(i, j, 5), pair%tangential_stiffness)
             call take(table(i, j, 6), pair%cohesion)
+            call take(table(i, j, 7), pair%rolling_friction)
             table(j, i, :) = table(i, j, :)
          end associate
       end do
@@ -92,6 +97,7 @@ contains
       pairs%friction_coefficient = new_pair_value(table(:, :, 4), 1.0_wp)
       pairs%tangential_stiffness = new_pair_value(table(:, :, 5)*table(:, :, 1), pairs%tangential_stiffness%one)
       pairs%cohesion = new_pair_value(table(:, :, 6), 1.0_wp)
+      pairs%rolling_friction = new_pair_value(table(:, :, 7), 1.0_wp)
    end function pair_parameters
 
    !> Parameters of contacts between bodies without materials
@@ -105,6 +111,7 @@ contains
       pairs%friction_coefficient%one = forces%friction_coefficient
       pairs%tangential_stiffness%one = forces%tangential_stiffness*forces%stiffness
       pairs%cohesion%one = forces%cohesion
+      pairs%rolling_friction%one = forces%rolling_friction
    end function uniform_parameters
 
    !> Take a value if it is given.
@@ -125,7 +132,7 @@ contains
 
       mixed = [2.0_wp*min(a(1), b(1))*(max(a(1), b(1))/(a(1) + b(1))), min(a(2), b(2)), &
                0.5_wp*(a(3) + b(3)), min(a(4), b(4)), 0.5_wp*(a(5) + b(5)), &
-               sqrt(a(6))*sqrt(b(6))]
+               sqrt(a(6))*sqrt(b(6)), min(a(7), b(7))]
       where (abs(a - b) <= 0.0_wp) mixed = a
    end function mixed
 

@@ -219,10 +219,11 @@ contains
       !> Mobility of a wall that yields [m/kg]
       real(wp), intent(in) :: extra
       type(linearised_contact_t) :: element
-      real(wp) :: g(4), alone(4)
+      real(wp) :: g(4), alone(4), rolling(2)
 
       g = [extra, extra, 0.0_wp, 0.0_wp]
       alone = 0.0_wp
+      rolling = 0.0_wp
       call add_body(contacts%first(c), contacts%arm_first(:, c), numbers(1))
       call add_body(contacts%second(c), contacts%arm_second(:, c), numbers(2))
       if (allocated(bodies%material)) element%materials = bodies%material([contacts%first(c), contacts%second(c)])
@@ -237,6 +238,8 @@ contains
       element%normal_mass = 1.0_wp/element%normal_mobility
       element%tangential_mass = 1.0_wp/alone(2)
       element%rotational_mobility = alone(4)
+      element%rolling_radius = 1.0_wp/rolling(1)
+      element%rolling_inertia = 1.0_wp/rolling(2)
       call law%stiffen(element)
       step_of_contact = step_of_element(table, element, g)
 
@@ -256,6 +259,8 @@ contains
          mine(3) = along*across*bodies%inverse_inertia(s)
          mine(4) = bodies%inverse_inertia(s)
          alone = alone + mine
+         rolling = rolling + [1.0_wp/bodies%radius(s), &
+                              1.0_wp/(bodies%inertia(s) + bodies%mass(s)*bodies%radius(s)**2)]
          g = g + mine*number
       end subroutine add_body
 
@@ -328,7 +333,8 @@ contains
             element = linearised_contact_t(materials=[i, j], ratio=ratio, length=2.0_wp, &
                                            inverse_length=0.5_wp*ratio, normal_mobility=mobility, &
                                            normal_mass=1.0_wp/mobility, rotational_mobility=turning*mobility, &
-                                           tangential_mass=1.0_wp/mobility)
+                                           tangential_mass=1.0_wp/mobility, rolling_radius=1.0_wp, &
+                                           rolling_inertia=(1.0_wp + 1.0_wp/turning)/mobility)
             call law%stiffen(element)
             is_stable = is_stable .and. step_of_element(table, element, g) >= step
          end do

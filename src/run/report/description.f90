@@ -210,6 +210,8 @@ contains
             to_text(pairs%friction_coefficient%of(materials), 3)
          if (index(parts, 'cohesion') > 0) text = text//', cohesion '//to_text(pairs%cohesion%of(materials), 3)// &
             ' N/m2'
+         if (index(parts, 'rolling') > 0) text = text//', rolling friction '// &
+            to_text(pairs%rolling_friction%of(materials), 3)
       end associate
    end function pair_text
 
