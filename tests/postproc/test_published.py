@@ -16,6 +16,7 @@ ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 
 #: Pages with numbers that a run of the program made, and files beside tables that have no room for words
 PAGES = [
+    "inputs/beverloo.md",
     "inputs/bench/README.md",
     "inputs/biaxial.md",
     "inputs/performance.md",

@@ -42,7 +42,8 @@ contains
       end do
       call hold(table)
       call accelerate(table)
-      call stop_on_floor(table)
+      call stop_on_floor(table, 'level floor', '')
+      call stop_on_floor(table, 'level floor with exact friction', ' friction = ''exact''')
       call oscillate(table)
       call converge(table)
    end subroutine run_rolling_resistance
@@ -147,14 +148,16 @@ contains
    end subroutine accelerate
 
    !> Roll on a level floor until the body stops, and wait.
-   subroutine stop_on_floor(table)
+   subroutine stop_on_floor(table, name, friction)
       type(table_t), intent(inout) :: table
+      character(len=*), intent(in) :: name, friction
       real(wp), parameter :: speed = 0.2_wp
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       integer :: k
 
-      call put_on_plane(many, 0.0_wp, 0.0_wp, [speed, -speed/radius], hard, '', simulation, error)
+      call put_on_plane(many, 0.0_wp, 0.0_wp, [speed, -speed/radius], hard//friction, '', simulation, &
+                        error)
       do k = 1, 100000
          if (.not. allocated(error)) call steps(simulation, 1, error)
          if (allocated(error)) exit
@@ -162,11 +165,12 @@ contains
       end do
       call table%note_error(error)
       if (allocated(error)) return
-      call table%expect_relative('deceleration on a level floor [m/s2]', mu*gravity/(1.0_wp + inertia_ratio(many)), &
+      call table%expect_relative('deceleration on a '//name//' [m/s2]', mu*gravity/(1.0_wp + inertia_ratio(many)), &
                                  (speed - simulation%bodies%velocity(1, 1))/(real(k, wp)*simulation%dt), 5.0e-3_wp)
       call steps(simulation, nint(1.0_wp/simulation%dt), error)
       call table%note_error(error)
-      call table%expect_absolute('speed 1 s later [m/s]', 0.0_wp, norm2(simulation%bodies%velocity(:, 1)), 1.0e-9_wp)
+      call table%expect_absolute(name//': speed 1 s later [m/s]', 0.0_wp, norm2(simulation%bodies%velocity(:, 1)), &
+                                 1.0e-9_wp)
    end subroutine stop_on_floor
 
    !> Spin on a smooth floor, by less than the spring yields: time between the first and the eleventh extreme angle.
