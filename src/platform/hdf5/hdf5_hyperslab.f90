@@ -5,7 +5,8 @@
 module polydem_hdf5_hyperslab
    use, intrinsic :: iso_c_binding, only: c_ptr
    use hdf5, only: h5dget_space_f, h5dread_f, h5dwrite_f, h5p_dataset_xfer_f, h5pclose_f, h5pcreate_f, &
-      h5s_select_set_f, h5sclose_f, h5screate_simple_f, h5sselect_hyperslab_f, h5sselect_none_f, hid_t, hsize_t
+      h5pset_buffer_f, h5s_select_set_f, h5sclose_f, h5screate_simple_f, h5sselect_hyperslab_f, h5sselect_none_f, &
+      hid_t, hsize_t
    use polydem_errors, only: error_t
    use polydem_hdf5_access, only: enable_collective_write, writes_replicated
    use polydem_hdf5_location, only: check_status, dataset_location_t
@@ -13,6 +14,10 @@ module polydem_hdf5_hyperslab
    implicit none
    private
    public :: part_t, slab_t, slab_of, write_slab, read_slab
+
+   !> Size of the buffer in which HDF5 converts values to or from their type in the file [B]. HDF5 clears it in each
+   !> call; with its own choice of 1 MiB that takes longer than to write a small frame
+   integer(hsize_t), parameter :: buffer_size = 65536_hsize_t
 
    !> Part of the last dimension of an array that belongs to this rank
    type :: part_t
@@ -76,8 +81,9 @@ contains
       integer(hid_t) :: file_space, memory_space, properties
       integer :: status, ignored
 
+      properties = -1_hid_t
       call open_spaces(dataset, slab, memory_space, file_space, status)
-      if (status >= 0) call h5pcreate_f(h5p_dataset_xfer_f, properties, status)
+      if (status >= 0) call open_transfer(properties, status)
       if (status >= 0 .and. location%together) call enable_collective_write(properties, status)
       if (status >= 0) call h5dwrite_f(dataset, kind_in_memory, slab%address, status, memory_space, file_space, &
                                        properties)
@@ -95,17 +101,29 @@ contains
       !> Position in the data set, and the array to fill
       type(slab_t), intent(in) :: slab
       type(error_t), allocatable, intent(inout) :: error
-      integer(hid_t) :: file_space, memory_space
+      integer(hid_t) :: file_space, memory_space, properties
       type(c_ptr) :: buffer
       integer :: status, ignored
 
       buffer = slab%address
+      properties = -1_hid_t
       call open_spaces(dataset, slab, memory_space, file_space, status)
-      if (status >= 0) call h5dread_f(dataset, kind_in_memory, buffer, status, memory_space, file_space)
+      if (status >= 0) call open_transfer(properties, status)
+      if (status >= 0) call h5dread_f(dataset, kind_in_memory, buffer, status, memory_space, file_space, properties)
       call check_status(status, 'read', location, error)
+      call h5pclose_f(properties, ignored)
       call h5sclose_f(file_space, ignored)
       call h5sclose_f(memory_space, ignored)
    end subroutine read_slab
+
+   !> Create the properties of a transfer.
+   subroutine open_transfer(properties, status)
+      integer(hid_t), intent(out) :: properties
+      integer, intent(out) :: status
+
+      call h5pcreate_f(h5p_dataset_xfer_f, properties, status)
+      if (status >= 0) call h5pset_buffer_f(properties, buffer_size, status)
+   end subroutine open_transfer
 
    !> Create the data spaces of a slab in memory and in the file.
    subroutine open_spaces(dataset, slab, memory_space, file_space, status)
