@@ -12,7 +12,7 @@ module polydem_complete
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_thread_changes, only: part
-   use polydem_thread_results, only: loop_results_t
+   use polydem_loop_results, only: loop_results_t
    implicit none
    private
    public :: complete_step

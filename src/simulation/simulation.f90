@@ -19,7 +19,7 @@ module polydem_simulation
    use polydem_traffic, only: traffic_t
    use polydem_wall_energy, only: add_cell, add_loads
    use polydem_walls, only: walls_t
-   use polydem_thread_results, only: loop_results_t
+   use polydem_loop_results, only: loop_results_t
    implicit none
    private
    public :: simulation_t, relaxation_t, former_direction, time_of, acts_on_all, compute_balance

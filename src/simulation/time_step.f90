@@ -9,7 +9,7 @@ module polydem_time_step
    use polydem_complete, only: complete_step
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_loop, only: loop_over_contacts
-   use polydem_energy_balance, only: begin_step
+   use polydem_energy_balance, only: expire_balance
    use polydem_errors, only: error_t, raise, run_error
    use polydem_exchange_bodies, only: exchange_bodies
    use polydem_force_sums, only: assemble_forces, total_forces
@@ -44,7 +44,7 @@ contains
       if (allocated(self%traffic) .and. .not. allocated(error)) call exchange_bodies(self, error)
       if (allocated(error)) return
       self%step = self%step + 1_lp
-      call begin_step(self%energy_balance)
+      call expire_balance(self%energy_balance)
       call change_cell(self%dt, real(self%step - 1_lp, wp)*self%dt, time_of(self), self%bodies)
       call check_cell(self, error)
       associate (timers => self%timers, domain => self%domain)

@@ -51,6 +51,7 @@ contains
    subroutine measure_condition(simulation)
       !> The simulation at the end of a step; `stages` changes
       type(simulation_t), intent(inout) :: simulation
+      type(sample_area_t) :: area
       real(wp) :: value, moved(2)
 
       if (.not. is_check(simulation, simulation%step)) return
@@ -68,8 +69,9 @@ contains
          case ('departed')
             value = departures(simulation, stage%sink)
          case ('solid_fraction')
-            call solid_fraction(simulation%bodies, simulation%comm, sample_area_t(stage%low, stage%high, &
-                                stage%high - stage%low), value)
+            area = sample_area_t(stage%low, stage%high, stage%high - stage%low)
+            if (.not. all(stage%low < stage%high)) call find_area(simulation, area)
+            call solid_fraction(simulation%bodies, simulation%comm, area, value)
          case default
             associate (reference => simulation%stages%reference)
                moved = wall_vector(simulation) - reference

@@ -137,9 +137,11 @@ contains
       real(wp), intent(in) :: time
       real(wp) :: u
 
+      stress = 0.0_wp
+      if (time < load%start) return
       stress = load%stress(axis)
       if (time - load%start >= load%ramp) return
-      u = max(0.0_wp, time - load%start)/load%ramp
+      u = (time - load%start)/load%ramp
       stress = stress*(u*u*(3.0_wp - 2.0_wp*u))
    end function present_stress
 

@@ -20,7 +20,7 @@ PAIRS = [
 ]
 
 #: Parts of the names of the procedures of the tree; the same objects contain the filter of the filtered quadtree
-TREE = ("polydem_quadtree", "__polydem_candidates")
+TREE = ("polydem_quadtree", "__polydem_candidates", "__polydem_linked_candidates")
 
 
 def calls(path):

@@ -28,10 +28,11 @@ INTEGRATE = "\n&integrate duration = 1 /\n"
 def short(namelist):
     """Overrides that make a run short: its duration, or the times of its stages."""
     text = namelist.read_text(encoding="utf-8")
-    names = re.findall(r"^ *&stage\s+name = '(\w+)'", text, re.MULTILINE)
-    if not names:
+    found = re.findall(r"^ *&stage\s+name = '(\w+)'([^/]*)", text, re.MULTILINE)
+    if not found:
         return SHORT
-    stages = [f"stage.{name}.{entry}" for name in names for entry in ("longest=2e-5", "at_limit=next", "hold=0")]
+    stages = [f"stage.{name}.{entry}" for name, entries in found for entry in (
+        ("longest=2e-5", "at_limit=next", "hold=0") if "until" in entries else ("duration=2e-5",))]
     return [word for word in SHORT if "duration" not in word] + stages
 
 

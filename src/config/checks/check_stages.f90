@@ -3,7 +3,7 @@ module polydem_check_stages
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: wp
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: settings_t, stage_settings_t
    use polydem_strings, only: quoted
    implicit none
    private
@@ -80,10 +80,27 @@ contains
             blame('stage', stage%name, 'until', '= ''stress'' needs the area of the sample; give ''area'' in '// &
             '&sample', instances, error)
          if (any(stage%until == [character(len=14) :: 'count', 'solid_fraction']) &
-             .and. .not. all(stage%low < stage%high)) call blame('stage', stage%name, 'high', &
-            'must exceed ''low'' along x and y', instances, error)
+             .and. .not. all(stage%low < stage%high)) call check_rectangle(settings, stage, instances, error)
       end associate
    end subroutine check_stage
+
+   !> Check a stage without a rectangle: the solid fraction may be that of a sample or of a cell.
+   pure subroutine check_rectangle(settings, stage, instances, error)
+      type(settings_t), intent(in) :: settings
+      type(stage_settings_t), intent(in) :: stage
+      type(instance_t), intent(in) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (any(abs([stage%low, stage%high]) > 0.0_wp)) then
+         call blame('stage', stage%name, 'high', 'must exceed ''low'' along x and y', instances, error)
+      else if (stage%until == 'count') then
+         call blame('stage', stage%name, 'until', '= ''count'' needs a rectangle; give ''low'' and ''high''', &
+                    instances, error)
+      else if (settings%sample%area == 'none' .and. settings%cell%periodic /= 'xy') then
+         call blame('stage', stage%name, 'until', '= ''solid_fraction'' needs an area; give ''low'' and ''high'', '// &
+                    'or ''area'' in &sample', instances, error)
+      end if
+   end subroutine check_rectangle
 
    !> An example of a limit
    pure function example_of(until) result(text)

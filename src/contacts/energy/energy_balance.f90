@@ -33,7 +33,7 @@ module polydem_energy_balance
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: energy_balance_t, balance_t, start_energy_balance, begin_step, accumulate_bodies, &
+   public :: energy_balance_t, balance_t, start_energy_balance, expire_balance, accumulate_bodies, &
       accumulate_all, accumulate_walls, count_step, evaluate_balance, allocate_channels, totals
    public :: n_totals, at_mass, at_torque, at_channels, at_walls
 
@@ -205,13 +205,13 @@ contains
       call add_walls(bodies, walls, 1.0_wp, first, last, sums%power_sum, sums%wall_sum)
    end subroutine accumulate_walls
 
-   !> Begin a step: bodies and contacts are no longer those of the last accumulated step.
-   pure subroutine begin_step(sums)
+   !> At the start of a step bodies and contacts are no longer those of the last accumulated step.
+   pure subroutine expire_balance(sums)
       !> Running sums
       type(energy_balance_t), intent(inout) :: sums
 
       sums%is_current = .false.
-   end subroutine begin_step
+   end subroutine expire_balance
 
    !> Count a step of which the rates of all bodies and the action of fixed bodies are accumulated.
    pure subroutine count_step(sums)

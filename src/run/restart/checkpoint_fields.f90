@@ -1,5 +1,5 @@
 !> The list of fields of a checkpoint: the bodies, and all other state that outlives a time step and does not follow
-!> from the namelist.
+!> from the namelist. Parts of a simulation that have a procedure `serialize_...` name their own fields there.
 !>
 !> A checkpoint does not hold motions (functions of time, of which tables are compared by a hash), contacts (computed by
 !> the next step) or the state of neighbour finders. After a restart the first search starts without pairs. The pairs

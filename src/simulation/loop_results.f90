@@ -1,6 +1,6 @@
 !> Results of the loop over the contacts of a step. The arrays stay from step to step, so that a step allocates no
 !> memory.
-module polydem_thread_results
+module polydem_loop_results
    use polydem_contact_incidence, only: incidence_t
    use polydem_contact_rows, only: contact_rows_t
    use polydem_contacts, only: contacts_t
@@ -61,4 +61,4 @@ module polydem_thread_results
       type(incidence_t) :: incidence
    end type loop_results_t
 
-end module polydem_thread_results
+end module polydem_loop_results
