@@ -90,7 +90,7 @@ SCENES = {
 &forces gravity = 0, 0 stiffness = 1e6 /
 &integrate safety_factor = 0.1 duration = 0.02 /
 """,
-    # A cell that yields to a stress across the shear: it shrinks by a third.
+    # A cell that yields to a stress across the shear: it shrinks to less than a half.
     "yielding": """\
 &cell periodic = 'xy' low = -0.05, -0.03 size = 0.1, 0.1 shear_rate = 60 profile = .true.
    obeys = 'y' stress = 0, 2e4 mass = 0.02 damping_ratio = 0.5 /

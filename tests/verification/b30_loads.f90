@@ -4,15 +4,14 @@
 !> is asked for. In a biaxial test between walls without friction, the stress of the contacts in the sample is that of
 !> the walls, and the energy that is missing is of second order in dt.
 module b30_loads
-   use trial, only: begin_scene, steps
+   use trial, only: begin_scene, find_missing_energy, steps
    use verification_table, only: table_t
    use polydem_contacts, only: contact_force
-   use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_quantities, only: stress
    use polydem_sample_area, only: sample_area_t
-   use polydem_simulation, only: compute_balance, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -226,20 +225,11 @@ contains
    !> The energy that is missing after 0.2 s, with the time step and with a half of it.
    subroutine close_energy(table)
       type(table_t), intent(inout) :: table
-      type(simulation_t) :: simulation
-      type(balance_t) :: balance
       type(error_t), allocatable :: error
       real(wp) :: missing(2), work
-      integer :: k
 
-      do k = 1, 2
-         call begin_scene(biaxial(100, 'duration = 0.2 dt = '//to_text(5.0e-6_wp/real(k, wp), 8)), simulation, error)
-         if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
-         if (allocated(error)) exit
-         call compute_balance(simulation, balance)
-         missing(k) = abs(balance%energy_residual)
-         work = balance%wall_work
-      end do
+      call find_missing_energy(biaxial(100, 'duration = 0.2 dt = 5e-6'), biaxial(100, 'duration = 0.2 dt = 2.5e-6'), &
+                               missing, work, error)
       call table%note_error(error)
       if (allocated(error)) return
       call table%expect_absolute('biaxial test: energy that is missing, over the work of the walls', 0.0_wp, &

@@ -5,14 +5,13 @@
 !> the cell, is of first order in dt, since places are stretched before the motion of a step. The place of the border
 !> has no meaning.
 module b33_yielding_cell
-   use trial, only: begin_scene, steps
+   use trial, only: begin_scene, find_missing_energy, steps
    use verification_table, only: table_t
-   use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_quantities, only: stress
    use polydem_sample_area, only: find_area, sample_area_t
-   use polydem_simulation, only: compute_balance, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -119,21 +118,12 @@ contains
    !> The energy that is missing after a fast compression, with the time step and with a half of it.
    subroutine close_energy(table)
       type(table_t), intent(inout) :: table
-      type(simulation_t) :: simulation
-      type(balance_t) :: balance
+      character(len=*), parameter :: cell = 'obeys = ''xy'' stress = 1e4, 1.2e4 damping_ratio = 0.2'
       type(error_t), allocatable :: error
       real(wp) :: missing(2), work
-      integer :: k
 
-      do k = 1, 2
-         call begin_scene(sample('obeys = ''xy'' stress = 1e4, 1.2e4 damping_ratio = 0.2', &
-                                 'duration = 0.2 dt = '//to_text(5.0e-6_wp/real(k, wp), 8)), simulation, error)
-         if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
-         if (allocated(error)) exit
-         call compute_balance(simulation, balance)
-         missing(k) = abs(balance%energy_residual)
-         work = balance%wall_work
-      end do
+      call find_missing_energy(sample(cell, 'duration = 0.2 dt = 5e-6'), sample(cell, 'duration = 0.2 dt = 2.5e-6'), &
+                               missing, work, error)
       call table%note_error(error)
       if (allocated(error)) return
       call table%expect_absolute('energy that is missing, over the work of the cell', 0.0_wp, missing(2)/abs(work), &

@@ -3,18 +3,19 @@ module trial
    use serial_simulation, only: start_simulation
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_prescribed_motion, only: motion_t
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: compute_balance, simulation_t
    use polydem_start, only: new_simulation
    use polydem_time_step, only: advance
    use polydem_wall, only: new_wall, wall_t
    implicit none
    private
-   public :: begin, begin_scene, steps, block_at
+   public :: begin, begin_scene, steps, find_missing_energy, block_at
 
    !> Entries of &forces of the model that most expected values are for: the area law, with damping of its rate alone
    character(len=*), parameter, public :: area_law = " law = 'area' tilt_damping = 0"
@@ -80,6 +81,33 @@ contains
          if (allocated(error)) return
       end do
    end subroutine steps
+
+   !> Find the energy that is missing at the end of two runs of a scene, and the work of walls or cell in the second.
+   subroutine find_missing_energy(coarse, fine, missing, work, error)
+      !> Groups of the namelist, with a time step and with a half of it
+      character(len=*), intent(in) :: coarse, fine
+      !> Absolute energy that is missing with either step [J/m]
+      real(wp), intent(out) :: missing(2)
+      !> Work [J/m]
+      real(wp), intent(out) :: work
+      !> What went wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(simulation_t) :: simulation
+      type(balance_t) :: balance
+      integer :: k
+
+      missing = huge(missing)
+      work = 0.0_wp
+      do k = 1, 2
+         if (k == 1) call begin_scene(coarse, simulation, error)
+         if (k == 2) call begin_scene(fine, simulation, error)
+         if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
+         if (allocated(error)) return
+         call compute_balance(simulation, balance)
+         missing(k) = abs(balance%energy_residual)
+         work = balance%wall_work
+      end do
+   end subroutine find_missing_energy
 
    !> Corners of a rectangle around a centre, turned by an angle, (2, 4) [m]
    pure function block_at(x, y, width, height, angle) result(vertices)
