@@ -41,6 +41,8 @@ module polydem_pieces
       procedure :: polygon
       procedure :: turned_polygon
       procedure :: piece_polygon
+      procedure :: turned_piece
+      procedure :: numbers_of
       procedure :: pieces_of
       procedure :: first_of
       procedure :: n_pieces
@@ -48,6 +50,7 @@ module polydem_pieces
       procedure :: bodies_of
       procedure :: area_of
       procedure :: area_of_piece
+      procedure :: allow
       procedure :: find_pieces
       procedure :: turn_pieces
    end type pieces_t
@@ -87,6 +90,31 @@ contains
          polygon = self%vertex(:, self%start(p):self%start(p + 1_ip) - 1_ip)
       end if
    end function piece_polygon
+
+   !> Vertices of a piece turned by the angle of its body, relative to the centre of the body, (2, vertex) [m]
+   pure function turned_piece(self, p) result(polygon)
+      class(pieces_t), intent(in) :: self
+      !> Index of the piece
+      integer(ip), intent(in) :: p
+      real(wp), allocatable :: polygon(:, :)
+
+      if (self%most == 1_ip) then
+         polygon = self%turned_polygon(p)
+      else
+         polygon = self%turned(:, self%start(p):self%start(p + 1_ip) - 1_ip)
+      end if
+   end function turned_piece
+
+   !> Number of the piece of each vertex of a body, from 0
+   pure function numbers_of(self, s) result(numbers)
+      class(pieces_t), intent(in) :: self
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      integer(ip) :: numbers(self%vertex_start(s + 1_ip) - self%vertex_start(s))
+
+      numbers = 0_ip
+      if (self%most > 1_ip) numbers = self%number(self%vertex_start(s):self%vertex_start(s + 1_ip) - 1_ip)
+   end function numbers_of
 
    !> First and last piece of a body
    pure function pieces_of(self, s) result(pieces)
@@ -166,6 +194,18 @@ contains
 
       area = signed_area(self%piece_polygon(p))
    end function area_of_piece
+
+   !> Allow bodies of a number of pieces in the run, which the bodies here need not have.
+   pure subroutine allow(self, most)
+      class(pieces_t), intent(inout) :: self
+      !> The number
+      integer(ip), intent(in) :: most
+
+      if (most <= self%most) return
+      if (self%most == 1_ip) allocate (self%number(size(self%vertex, 2)), source=0_ip)
+      self%most = most
+      call self%find_pieces()
+   end subroutine allow
 
    !> Derive the pieces from the vertices and the column `number`. Without this column nothing is done.
    pure subroutine find_pieces(self)

@@ -5,7 +5,8 @@
 module polydem_gas
    use polydem_arrange, only: arrange_grains, region_t, total_area
    use polydem_errors, only: error_t
-   use polydem_grains, only: draw_grains, grains_t
+   use polydem_grain_list, only: grains_t
+   use polydem_grains, only: draw_grains
    use polydem_kinds, only: ip, wp
    use polydem_outlines, only: rectangle
    use polydem_parts, only: parts_t

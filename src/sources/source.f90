@@ -5,7 +5,8 @@
 !> grains are therefore not preferred. All ranks draw the same numbers.
 module polydem_source
    use polydem_elementary, only: hypotenuse
-   use polydem_grains, only: draw_grains, grains_t
+   use polydem_grain_list, only: grains_t
+   use polydem_grains, only: draw_grains, most_pieces_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_parts, only: new_grains
    use polydem_random, only: new_random, random_t
@@ -37,6 +38,8 @@ module polydem_source
       !> Random numbers of shapes and of places
       type(random_t) :: shapes, places
    contains
+      procedure, private :: as_group
+      procedure :: most_pieces
       procedure :: draw_shape
       procedure :: draw_candidates
       procedure :: wanted
@@ -47,6 +50,8 @@ module polydem_source
    type :: candidate_t
       !> Corners relative to its place, (2, corner) [m]
       real(wp), allocatable :: corners(:, :)
+      !> Number of the piece of each corner, from 0
+      integer(ip), allocatable :: piece(:)
       !> Greatest distance of a corner from its place [m]
       real(wp) :: radius = 0.0_wp
       !> Places to try, (2, place) [m]
@@ -79,21 +84,11 @@ contains
       type(grains_settings_t) :: group
       type(grains_t) :: grains
 
+      group = self%as_group()
+      call draw_grains(group, random, 1_ip, grains)
+      candidate%corners = grains%polygon(1_ip)
+      candidate%piece = grains%pieces_of(1_ip)
       associate (s => self%settings)
-         group = new_grains(s%name)
-         group%shape = s%shape
-         group%corners = s%corners
-         group%short_axis = s%short_axis
-         group%long_axis = s%long_axis
-         group%diameter = s%diameter
-         group%width = s%width
-         group%height = s%height
-         group%elongation = s%elongation
-         group%outline = s%outline
-         group%outline_corners = s%outline_corners
-         group%angle = s%angle
-         call draw_grains(group, random, 1_ip, grains)
-         candidate%corners = grains%polygon(1_ip)
          group%sizes = s%sizes
          group%size_ratio = s%size_ratio
          group%size_spread = s%size_spread
@@ -106,6 +101,36 @@ contains
       end associate
       candidate%radius = maxval(hypotenuse(candidate%corners(1, :), candidate%corners(2, :)))
    end subroutine draw_shape
+
+   !> The shapes of the source as those of a group of grains of one size
+   function as_group(self) result(group)
+      class(source_t), intent(in) :: self
+      type(grains_settings_t) :: group
+
+      associate (s => self%settings)
+         group = new_grains(s%name)
+         group%shape = s%shape
+         group%corners = s%corners
+         group%short_axis = s%short_axis
+         group%long_axis = s%long_axis
+         group%diameter = s%diameter
+         group%width = s%width
+         group%height = s%height
+         group%arm = s%arm
+         group%elongation = s%elongation
+         group%outline = s%outline
+         group%outline_corners = s%outline_corners
+         group%outline_pieces = s%outline_pieces
+         group%angle = s%angle
+      end associate
+   end function as_group
+
+   !> Greatest number of pieces of a body
+   integer(ip) function most_pieces(self)
+      class(source_t), intent(in) :: self
+
+      most_pieces = most_pieces_of(self%as_group())
+   end function most_pieces
 
    !> Draw the next bodies with places that have them within the rectangle. The random numbers of shapes stay as they
    !> are.

@@ -107,12 +107,10 @@ CAPABILITIES = {
 REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
     ("exact_friction", "yielding"): "does not know how the cell grows",
-    ("stages", "yielding"): "needs gravity = 0, 0",
     ("traffic", "yielding"): "do not move with the cell",
     ("exact_friction", "local_damping"): "whose forces depend on the motion without it",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",
-    ("pieces", "traffic"): "cannot be combined with &source and &sink",
     ("hunt_crossley", "materials"): "'restitution' in &material hard is not used",
 }
 
@@ -136,9 +134,13 @@ def text(names):
 
     container = joined("container") or BOX
     gravity = "0, 0" if container in WITHOUT_WALLS else "0, -40"
+    groups = "".join(part.groups for part in chosen)
+    if container == YIELDING:
+        # Such a cell has no gravity, in no stage
+        groups = groups.replace(" gravity = 20, -20", "")
     duration = "" if "stages" in names else f"duration = {min(part.duration for part in chosen)}"
     return (container.format(wall=joined("wall")) + GRAINS.format(lower=joined("lower"), upper=joined("upper"))
-            + "".join(part.groups for part in chosen)
+            + groups
             + f"&forces gravity = {gravity} stiffness = 4e5 {joined('forces')} /\n"
             + f"&integrate {duration} {joined('integrate')} /\n"
             + f"&output frame_interval = 1e-3 frames_per_segment = 6 contacts = .true. {joined('output')} /\n"

@@ -143,7 +143,8 @@ SCENES = {
 &forces gravity = 0, -40 stiffness = 1e6 /
 &integrate duration = 0.012 /
 """,
-    # A scene that starts empty: bodies of two materials enter in two ways, and leave from the air and out of the heap.
+    # A scene that starts empty: bodies of two materials, some of several pieces, enter in two ways, and leave from the
+    # air and out of the heap.
     "flow": """\
 &wall name = 'floor' outline = 'rectangle' low = -0.1, -0.02 high = 0.1, 0 /
 &wall name = 'left' outline = 'line' from = -0.05, 0.3 to = -0.04, 0 thickness = 0.01 /
@@ -151,7 +152,7 @@ SCENES = {
 &material name = 'heavy' density = 3000 /
 &source name = 'feed' low = -0.04, 0.08 high = 0.04, 0.16 count = 70 velocity = 0.1, -1 interval = 30 size_ratio = 2 /
 &source name = 'rain' low = -0.04, 0.18 high = 0.04, 0.22 rate = 3000 interval = 70 material = 'heavy' velocity = 0, -2
-   shape = 'regular' corners = 3, 6 diameter = 5e-3, 8e-3 /
+   shape = 'cross' width = 8e-3 arm = 3e-3 angle = 0, 360 /
 &sink name = 'hole' low = -0.02, -1 high = 0.02, 0.02 interval = 150 /
 &sink name = 'draught' low = -0.05, 0.06 high = 0, 0.07 interval = 60 /
 &forces gravity = 0, -80 stiffness = 1e6 drag = 2 /

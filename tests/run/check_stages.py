@@ -148,6 +148,24 @@ def a_cell_that_obeyed_a_stress_keeps_its_size(case):
         assert deepest is None or float(deepest.group(1)) < 0.05, output
 
 
+def pieces_keep_their_history(case):
+    """Finds bodies that lose their pieces in a start from a result, and sources that lose those of others."""
+    cross = "shape = 'cross' width = 0.009 arm = 3e-3 angle = 0, 360"
+    source = f"&source name = 'feed' low = -0.04, 0.12 high = 0.04, 0.2 count = 80 interval = 32 {cross} {{}} /\n"
+    for k, more in enumerate(("", source)):
+        scene = SCENE.format(seed=1).replace("arrangement = 'spread'", f"arrangement = 'random' {cross}")
+        scene = scene.replace("high = 0.05, 0.1", "high = 0.05, 0.12").replace("low = -0.049, 0.1 high = 0.049, 0.11",
+                                                                               "low = -0.049, 0.3 high = 0.049, 0.31")
+        rest = OUTPUT.format(duration="", scheme="")
+        second = "&stage name = 'press' duration = 7.8125e-3 gravity = 20, -60 /\n"
+        one = case.run(scene + STAGES[0] + second + more.format("stage = 'press'") + rest, f"pieces_{k}")
+        case.run(scene + STAGES[0] + rest, f"first_{k}")
+        start = (f"&scene name = 'result' start_from = 'first_{k}' /\n" + FOUND
+                 + "&forces stiffness = 2e5 friction_coefficient = 0.5 /\n" + second + more.format("") + rest)
+        for how in ({}, {"ranks": 3})[:2 if case.parallel else 1]:
+            assert hash_of(case.run(start, f"second_{k}", "--force", **how)) == hash_of(one), (k, how)
+
+
 def conditions_end_stages_alike_everywhere(case, seeds=2):
     """Finds decisions that depend on ranks, threads, finders or restarts."""
     for seed in range(1, seeds + 1):
@@ -241,7 +259,7 @@ def faults_are_named(case):
 
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
-         a_cell_that_obeyed_a_stress_keeps_its_size,
+         a_cell_that_obeyed_a_stress_keeps_its_size, pieces_keep_their_history,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
 

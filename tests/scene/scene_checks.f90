@@ -109,11 +109,11 @@ contains
       end do
    end function all_convex
 
-   !> Number of pairs of bodies, not both fixed, without a separating edge
+   !> Number of pairs of bodies, not both fixed, of which some pieces have no separating edge
    integer function count_overlaps(bodies)
       !> Bodies
       type(bodies_t), intent(in) :: bodies
-      real(wp), allocatable :: reach(:), v_i(:, :), v_j(:, :)
+      real(wp), allocatable :: reach(:)
       real(wp) :: distance(2)
       integer(ip) :: i, j
 
@@ -129,11 +129,32 @@ contains
             if (bodies%fixed(i) .and. bodies%fixed(j)) cycle
             distance = bodies%position(:, i) - bodies%position(:, j)
             if (distance(1)**2 + distance(2)**2 > (reach(i) + reach(j))**2) cycle
-            call find_vertices(bodies, i, v_i)
-            call find_vertices(bodies, j, v_j)
-            if (.not. (separated(v_i, v_j) .or. separated(v_j, v_i))) count_overlaps = count_overlaps + 1
+            if (meet(i, j)) count_overlaps = count_overlaps + 1
          end do
       end do
+
+   contains
+
+      !> Whether some pieces of two bodies have no separating edge
+      logical function meet(a, b)
+         integer(ip), intent(in) :: a, b
+         real(wp), allocatable :: p(:, :), q(:, :)
+         integer(ip) :: of_a(2), of_b(2), k, l
+
+         meet = .false.
+         of_a = bodies%pieces%pieces_of(a)
+         of_b = bodies%pieces%pieces_of(b)
+         do k = of_a(1), of_a(2)
+            p = bodies%pieces%turned_piece(k)
+            p = p + spread(bodies%position(:, a), 2, size(p, 2))
+            do l = of_b(1), of_b(2)
+               q = bodies%pieces%turned_piece(l)
+               q = q + spread(bodies%position(:, b), 2, size(q, 2))
+               meet = meet .or. .not. (separated(p, q) .or. separated(q, p))
+            end do
+         end do
+      end function meet
+
    end function count_overlaps
 
    !> Whether all of b lies outside some edge of a

@@ -40,7 +40,7 @@ contains
       call table%show('mu = 0.5, 7 to 12 corners', angle)
       other = mean_angle(table, '', 'friction_coefficient = 0.5 stiffness = 1e7', '')
       call table%expect_absolute('ten times as stiff', angle, other, 1.5_wp)
-      other = mean_angle(table, '', 'friction_coefficient = 0.5 stiffness = 1e6', 'solid_fraction = 0.15')
+      other = mean_angle(table, '', 'friction_coefficient = 0.5 stiffness = 1e6', 'safety_factor = 0.15')
       call table%expect_absolute('half the step', angle, other, 1.5_wp)
       other = mean_angle(table, '', 'friction_coefficient = 0.2 stiffness = 1e6', '')
       call table%show('mu = 0.2', other)

@@ -11,7 +11,7 @@ module polydem_check_parts
    use polydem_strings, only: quoted, split_words, suggestion, to_text
    implicit none
    private
-   public :: check_parts, check_outlines, check_grading
+   public :: check_parts, check_cross, check_outlines, check_grading
 
    !> Upper limit of the number of corners of the grains of a group, of which half the range of integers can count
    integer(lp), parameter :: corner_limit = 2_lp**30
@@ -115,10 +115,7 @@ contains
          'must be ''rectangle'' with arrangement = ''column''', error)
       if (group%arrangement == 'column' .and. any(abs(group%angle) > 0.0_wp)) call blame(instance, 'angle', &
          'must be 0, 0 with arrangement = ''column''', error)
-      if (group%shape == 'cross' .and. (group%arm >= group%width .or. group%width > 1.0e6_wp*group%arm)) &
-         call blame(instance, 'arm', &
-         'must be less than ''width'', the distance of opposite ends, and not less than a millionth of it', error, &
-         'width')
+      if (group%shape == 'cross') call check_cross(group%width, group%arm, instance, error)
       if (group%corners(1) > group%corners(2)) call blame(instance, 'corners', 'must be in ascending order: write '// &
          to_text(group%corners(2))//', '//to_text(group%corners(1)), error)
       if (group%long_axis(1) > group%long_axis(2)) call blame(instance, 'long_axis', &
@@ -136,7 +133,8 @@ contains
          'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
       if (group%moving_grains > group%number .and. group%number > 0_ip) call blame(instance, 'moving_grains', &
          'must not exceed ''number''', error, 'number')
-      call check_outlines(group%shape, group%outline, group%outline_corners, group%outlines, instance, error)
+      call check_outlines(group%shape, group%outline, group%outline_corners, group%outline_pieces, group%outlines, &
+                          instance, error)
       call check_grading(group%sizes, group%grading, instance, error)
       if (group%number*max(4_lp, int(group%corners(2), lp), size(group%outline, kind=lp)/2_lp) > corner_limit) &
          call blame(instance, 'number', 'must not exceed 2^30 divided by the number of corners of a grain; give '// &
@@ -146,13 +144,13 @@ contains
    end subroutine check_group
 
    !> Check that there are outlines, and that their corners are as many as their numbers say.
-   pure subroutine check_outlines(shape, outline, corners, outlines, instance, error)
+   pure subroutine check_outlines(shape, outline, corners, pieces, outlines, instance, error)
       !> Shape of the grains
       character(len=*), intent(in) :: shape
       !> Corners of the outlines [m]
       real(wp), intent(in) :: outline(:)
-      !> Number of corners of each of them
-      integer(ip), intent(in) :: corners(:)
+      !> Number of corners of each polygon, and number of polygons of each shape
+      integer(ip), intent(in) :: corners(:), pieces(:)
       !> Path of a file of outlines
       character(len=*), intent(in) :: outlines
       type(instance_t), intent(in) :: instance
@@ -161,12 +159,27 @@ contains
       if (shape /= 'outline') return
       if (size(outline) == 0 .and. outlines == '') call blame(instance, 'outline', 'is required with shape = '// &
          '''outline'', unless ''outlines'' names a file; for example outline = 0, 0, 0.01, 0, 0.01, 0.01', error)
-      if (size(outline) + size(corners) > 0 .and. outlines /= '') call blame(instance, 'outlines', 'cannot be '// &
-         'combined with ''outline'' and ''outline_corners''; give only the file or the corners', error)
+      if (size(outline) + size(corners) + size(pieces) > 0 .and. outlines /= '') call blame(instance, 'outlines', &
+         'cannot be combined with ''outline'' and ''outline_corners''; give only the file or the corners', error)
       if (size(corners) > 0 .and. 2_lp*sum(int(corners, lp)) /= size(outline) .and. outlines == '') call blame( &
          instance, 'outline_corners', 'has '//to_text(sum(int(corners, lp)))//' corners in all, but ''outline'' '// &
-         'has '//to_text(size(outline, kind=lp)/2_lp)//'; give the number of corners of each outline', error, 'outline')
+         'has '//to_text(size(outline, kind=lp)/2_lp)//'; give the number of corners of each polygon', error, 'outline')
+      if (size(pieces) > 0 .and. sum(int(pieces, lp)) /= max(1, size(corners)) .and. outlines == '') call blame( &
+         instance, 'outline_pieces', 'has '//to_text(sum(int(pieces, lp)))//' polygons in all, but ''outline'' '// &
+         'and ''outline_corners'' have '//to_text(max(1_lp, size(corners, kind=lp)))//'; give the number of '// &
+         'polygons of each shape', error, 'outline_corners')
    end subroutine check_outlines
+
+   !> Check the lengths of a cross.
+   pure subroutine check_cross(width, arm, instance, error)
+      !> Distance of opposite ends, and width of the arms [m]
+      real(wp), intent(in) :: width, arm
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (arm >= width .or. width > 1.0e6_wp*arm) call blame(instance, 'arm', 'must be less than ''width'', the '// &
+         'distance of opposite ends, and not less than a millionth of it', error, 'width')
+   end subroutine check_cross
 
    !> Check a sieve curve.
    pure subroutine check_grading(sizes, grading, instance, error)

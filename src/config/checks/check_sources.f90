@@ -1,7 +1,7 @@
 !> Checks of the groups &source and &sink: entries that depend on each other.
 module polydem_check_sources
    use polydem_blame_entry, only: blame
-   use polydem_check_parts, only: check_grading, check_outlines
+   use polydem_check_parts, only: check_cross, check_grading, check_outlines
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: wp
@@ -60,7 +60,9 @@ contains
       if (source%long_axis(1) > source%long_axis(2)) call blame(instance, 'long_axis', order, error)
       if (source%diameter(1) > source%diameter(2)) call blame(instance, 'diameter', order, error)
       if (source%angle(1) > source%angle(2)) call blame(instance, 'angle', order, error)
-      call check_outlines(source%shape, source%outline, source%outline_corners, source%outlines, instance, error)
+      call check_outlines(source%shape, source%outline, source%outline_corners, source%outline_pieces, &
+                          source%outlines, instance, error)
+      if (source%shape == 'cross') call check_cross(source%width, source%arm, instance, error)
       call check_grading(source%sizes, source%grading, instance, error)
       if (source%shape == 'outline' .and. source%outlines == '' .and. &
           (size(source%outline) < 6 .or. modulo(size(source%outline), 2) == 1)) call blame(instance, 'outline', &
@@ -69,7 +71,8 @@ contains
          'must not exceed the first value of ''long_axis''', error, 'long_axis')
       if (source%shape == 'ellipse' .and. source%long_axis(2) > 1.0e6_wp*source%short_axis) call blame(instance, &
          'long_axis', 'must not exceed 1e6 times ''short_axis''', error, 'short_axis')
-      if (max(source%width, source%height) > 1.0e6_wp*min(source%width, source%height)) call blame(instance, 'width', &
+      if (source%shape == 'rectangle' .and. max(source%width, source%height) &
+          > 1.0e6_wp*min(source%width, source%height)) call blame(instance, 'width', &
          'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
    end subroutine check_shape
 

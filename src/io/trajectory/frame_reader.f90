@@ -11,7 +11,7 @@ module polydem_frame_reader
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: find_frame, list_frame, read_cell_size
+   public :: find_frame, list_frame, read_cell_size, read_most_pieces
 
 contains
 
@@ -54,6 +54,26 @@ contains
                  to_text(int(number, lp) - row)//' frames, counted from 0')
    end subroutine find_frame
 
+   !> Whether the shapes of the bodies of a segment are consistent
+   pure logical function fit(start, shape, piece, n)
+      !> Data sets /bodies/vertex_start, vertex and piece
+      integer(ip), intent(in) :: start(:), piece(:)
+      real(dp), intent(in) :: shape(:, :)
+      !> Number of bodies
+      integer, intent(in) :: n
+      integer :: k
+
+      fit = size(start) == n + 1 .and. size(shape, 1) == 2 .and. size(piece) == size(shape, 2)
+      if (fit) fit = start(1) == 0_ip .and. start(n + 1) == size(shape, 2) .and. all(start(2:) >= start(:n))
+      do k = 1, n
+         if (.not. fit .or. start(k + 1) == start(k)) cycle
+         associate (number => piece(start(k) + 1:start(k + 1)))
+            fit = number(1) == 0_ip .and. all(number(2:) == number(:size(number) - 1) &
+                                              .or. number(2:) == number(:size(number) - 1) + 1_ip)
+         end associate
+      end do
+   end function fit
+
    !> Append the bodies of a frame to a list, with their identifiers, masses and velocities.
    subroutine list_frame(path, row, list, error)
       !> Path of the segment
@@ -81,15 +101,16 @@ contains
       call file%read('/bodies/mass', mass, error)
       call file%read('/bodies/inertia', inertia, error)
       if (list%has_materials) call file%read('/bodies/material', material, error)
+      if (.not. allocated(error)) then
+         if (.not. allocated(material)) material = spread(0_ip, 1, size(id))
+         if (.not. allocated(piece)) piece = spread(0_ip, 1, size(shape, 2))
+         if (row < 0_lp .or. any([size(fixed), size(material), size(mass), size(inertia)] /= size(id)) &
+             .or. .not. fit(start, shape, piece, size(id))) call raise(error, input_error, path// &
+            ': the data sets of its segment of a trajectory are inconsistent')
+      end if
       if (.not. allocated(error)) call read_frame(file, row, id, frame, error)
       call file%close(error)
       if (allocated(error)) return
-      if (.not. allocated(material)) material = spread(0_ip, 1, size(id))
-      if (.not. allocated(piece)) piece = spread(0_ip, 1, size(shape, 2))
-      if (any([size(fixed), size(material), size(mass), size(inertia), size(start) - 1] /= size(id))) then
-         call raise(error, input_error, path//': its data sets have different numbers of bodies')
-         return
-      end if
       do j = 1_ip, size(frame%body, kind=ip)
          k = frame%body(j)
          call sine_and_cosine(real(frame%angle(j), wp), s, c)
@@ -135,5 +156,27 @@ contains
       call file%close(error)
       if (allocated(values) .and. .not. allocated(error)) size = real(values(1:2), wp)
    end subroutine read_cell_size
+
+   !> Read the greatest number of pieces of a body from a checkpoint.
+   subroutine read_most_pieces(path, most, error)
+      !> Path of the checkpoint
+      character(len=*), intent(in) :: path
+      !> The number; 1 if all bodies are convex
+      integer(ip), intent(out) :: most
+      !> Names the file and what is wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      integer(ip), allocatable :: value(:)
+
+      most = 1_ip
+      call file%open(path, error)
+      if (allocated(error)) return
+      if (file%has('/vertices/piece', error)) call file%read('/run/most_pieces', value, error)
+      call file%close(error)
+      if (.not. allocated(value) .or. allocated(error)) return
+      if (size(value) == 1 .and. all(value >= 1_ip)) most = value(1)
+      if (size(value) /= 1 .or. any(value < 1_ip)) call raise(error, input_error, path// &
+         ': /run/most_pieces is no number of pieces')
+   end subroutine read_most_pieces
 
 end module polydem_frame_reader

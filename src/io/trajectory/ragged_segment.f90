@@ -1,6 +1,7 @@
 !> Bodies and frames of a segment of a run in which bodies enter or leave.
 !>
-!>     /bodies      as in any segment, with one row per body that a frame of the segment has; rows are appended
+!>     /bodies      as in any segment, with one row per body that a frame of the segment has; rows are appended.
+!>                  piece is there if any body of the run may have several pieces
 !>     /frames      step, time: one row per frame; start: rows start[k] to start[k + 1] - 1 belong to frame k;
 !>                  id, position, angle, velocity, angular_velocity: one row per body of each frame;
 !>                  image (in a periodic cell), slid and shift (in a sheared cell)
@@ -93,6 +94,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(row_distribution_t) :: blocks
       integer(ip), allocatable :: behind(:)
+      integer(lp), allocatable :: pieces(:, :)
       real(dp), allocatable :: vertices(:, :)
       integer(ip) :: k, n
       character(len=*), parameter :: about_start = &
@@ -101,6 +103,12 @@ contains
       call order_vertices(comm, bodies, blocks, slots)
       n = bodies%pieces%vertex_start(bodies%n + 1_ip) - 1_ip
       call blocks%to_blocks(comm, real(bodies%pieces%vertex(:, :n), dp), vertices)
+      if (bodies%pieces%most > 1_ip) then
+         call blocks%to_blocks(comm, reshape(int(bodies%pieces%number, lp), [1_ip, n]), pieces)
+         call file%write('/bodies/piece', int(pieces(1, :), ip), error, '1', &
+                         'number of the piece of each vertex within its body, from 0', &
+                         part_t(blocks%first, blocks%total), rows=many_rows)
+      end if
       allocate (behind(size(corners)))
       n = rows%n_vertices + int(blocks%first, ip)
       do k = 1_ip, size(corners, kind=ip)

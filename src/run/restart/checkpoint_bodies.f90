@@ -36,10 +36,14 @@ contains
       class(serializer_t), intent(inout) :: serializer
       type(bodies_t), intent(inout) :: bodies
       integer(ip), allocatable :: corners(:)
-      integer(ip) :: last_id(1)
+      integer(ip) :: last_id(1), most(1)
 
       last_id = bodies%last_id
       call serialize_last(serializer, last_id)
+      most = bodies%pieces%most
+      if (most(1) > 1_ip) call serializer%field('/run/most_pieces', most, '1', &
+         'greatest number of pieces of a body of the run; pairs name a piece by the identifier of its body times '// &
+         'this number, plus the number of the piece')
       corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       call serialize_constants(serializer, bodies)
       call serialize_corners(serializer, corners)
@@ -62,7 +66,8 @@ contains
       !> Serializer; its `error` holds a failure, also if the bodies are invalid
       class(serializer_t), intent(inout) :: serializer
       class(communicator_t), intent(in) :: comm
-      !> On entry the bodies of the scene, on return those of the checkpoint
+      !> On entry the bodies of the scene, or at least their greatest number of pieces; on return those of the
+      !> checkpoint
       type(bodies_t), intent(inout) :: bodies
       type(taken_t) :: taken
       integer(ip) :: k, last_id(1), most_pieces

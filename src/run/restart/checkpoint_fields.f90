@@ -157,11 +157,13 @@ contains
    end subroutine save_pairs
 
    !> Read the contact history of the pairs that have a body of this rank. All pairs are read, some at a time.
-   subroutine read_pairs(serializer, s)
+   subroutine read_pairs(serializer, s, most_pieces)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> The simulation, which receives the history
       type(simulation_t), intent(inout) :: s
+      !> Greatest number of pieces of a body of the run that wrote the pairs; default: that of this run
+      integer(ip), intent(in), optional :: most_pieces
       type(packed_history_t) :: part
       integer(ip), allocatable :: id(:), owned(:)
       integer(lp) :: first, n
@@ -179,6 +181,7 @@ contains
          call serializer%choose_rows('/pairs/', [(first + k, k=1_ip, size(part%key, kind=ip))])
          call serialize_pairs(serializer, s%history, part)
          if (allocated(serializer%error)) cycle
+         if (present(most_pieces)) part%key = translated(part%key)
          call check_pairs(s, part, serializer%error)
          owned = pack([(k, k=1_ip, size(part%key, kind=ip))], &
                       [(has_body(part%key(k)), k=1_ip, size(part%key, kind=ip))])
@@ -186,6 +189,16 @@ contains
       end do
 
    contains
+
+      !> The key of a pair with the identifiers that its pieces have in this run
+      elemental integer(lp) function translated(key)
+         integer(lp), intent(in) :: key
+         integer(lp) :: id(2)
+
+         id = [shiftr(key, 32), iand(key, int(huge(1_ip), lp))]
+         id = id/most_pieces*s%bodies%pieces%most + modulo(id, int(most_pieces, lp))
+         translated = ior(shiftl(id(1), 32), id(2))
+      end function translated
 
       !> Whether this rank moves a body of a pair
       pure logical function has_body(key)

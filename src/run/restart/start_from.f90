@@ -13,7 +13,7 @@ module polydem_start_from
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
-   use polydem_frame_reader, only: find_frame, list_frame, read_cell_size
+   use polydem_frame_reader, only: find_frame, list_frame, read_cell_size, read_most_pieces
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_replace_bodies, only: settle_bodies
    use polydem_result_files, only: checkpoint_path, n_checkpoints
@@ -135,7 +135,9 @@ contains
          call list_frame(origin%path, origin%row, list, error)
          if (.not. allocated(error)) call new_bodies(list, bodies, error)
       else
-         call file%open(origin%path, error, comm)
+         call read_most_pieces(origin%path, bodies%pieces%most, error)
+         call comm%all_reduce_error(error)
+         if (.not. allocated(error)) call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call read_bodies(file, comm, bodies)
@@ -229,15 +231,16 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(origin_t) :: origin
       type(checkpoint_file_t) :: file
+      integer(ip) :: most
 
-      call open_start(simulation, file, origin, error)
+      call open_start(simulation, file, origin, most, error)
       if (allocated(error) .or. origin%is_frame) return
       ! Here the state of the integrator is only tried.
       call file%choose_rows('/bodies/', int(simulation%bodies%global_index, lp))
       call simulation%motion%integrator%serialize(file)
       if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
          call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
-      call read_pairs(file, simulation)
+      call read_pairs(file, simulation, most)
       call file%close(error)
       if (.not. allocated(error)) return
       error%message = error%message//'. The run of the result had other forces or another scheme; start from a '// &
@@ -246,13 +249,17 @@ contains
    end subroutine recall_history
 
    !> Open the checkpoint from which a simulation starts, unless it starts from a frame.
-   subroutine open_start(simulation, file, origin, error)
+   subroutine open_start(simulation, file, origin, most, error)
       type(simulation_t), intent(inout) :: simulation
       type(checkpoint_file_t), intent(inout) :: file
       type(origin_t), intent(out) :: origin
+      !> Greatest number of pieces of a body of the result
+      integer(ip), intent(out) :: most
       type(error_t), allocatable, intent(inout) :: error
 
+      most = 1_ip
       call find_origin(simulation%settings, origin, error)
+      if (.not. (allocated(error) .or. origin%is_frame)) call read_most_pieces(origin%path, most, error)
       call simulation%comm%all_reduce_error(error)
       if (.not. (allocated(error) .or. origin%is_frame)) call file%open(origin%path, error, simulation%comm)
    end subroutine open_start
@@ -266,17 +273,17 @@ contains
       type(origin_t) :: origin
       type(checkpoint_file_t) :: file
       type(bodies_t) :: before
-      integer(ip) :: s
+      integer(ip) :: most, s
 
       if (simulation%settings%scene%name /= 'result') return
-      call open_start(simulation, file, origin, error)
+      call open_start(simulation, file, origin, most, error)
       if (allocated(error) .or. origin%is_frame) return
       associate (bodies => simulation%bodies)
          before = bodies
          call file%choose_rows('/bodies/', int(bodies%global_index, lp))
          call serialize_bodies(file, bodies)
          call simulation%motion%integrator%serialize(file)
-         call read_pairs(file, simulation)
+         call read_pairs(file, simulation, most)
          do s = 1_ip, bodies%n
             if (.not. bodies%fixed(s)) cycle
             bodies%position(:, s) = before%position(:, s)

@@ -3,7 +3,8 @@
 module polydem_arrange
    use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t
-   use polydem_grains, only: draw_grains, grains_t, greatest_length
+   use polydem_grain_list, only: grains_t
+   use polydem_grains, only: draw_grains, greatest_length
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice, row_height
    use polydem_obstacles, only: obstacles_t
@@ -183,7 +184,7 @@ contains
       type(random_t) :: random
       real(wp), allocatable :: corners(:, :)
       real(wp) :: low(2), high(2), place(2)
-      integer(ip) :: k
+      integer(ip) :: k, p
       integer :: trial
 
       low = minval(region%corners, 2)
@@ -203,8 +204,10 @@ contains
             return
          end if
          centres(:, k) = place
-         corners = grains%polygon(k)
-         call obstacles%add(corners + spread(place, 2, size(corners, 2)))
+         do p = 0_ip, grains%n_pieces(k) - 1_ip
+            corners = grains%piece_polygon(k, p)
+            call obstacles%add(corners + spread(place, 2, size(corners, 2)))
+         end do
       end do
    end subroutine place_at_random
 

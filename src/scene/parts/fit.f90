@@ -2,7 +2,7 @@
 module polydem_fit
    use polydem_arrange, only: arrange_grains, region_t
    use polydem_errors, only: error_t
-   use polydem_grains, only: grains_t
+   use polydem_grain_list, only: grains_t
    use polydem_kinds, only: ip, wp
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: grains_settings_t

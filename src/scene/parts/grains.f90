@@ -3,14 +3,14 @@
 !> The usual grains are irregular convex polygons inscribed in ellipses. All ellipses have the same short axis. The long
 !> axis, the number of corners, the positions of the corners and the orientation are random. A polygon inscribed in an
 !> ellipse is convex for any positions of its corners. Other groups have regular or random polygons, rectangles or given
-!> outlines. If grains differ in size, all lengths are multiplied by the size factor of the grain.
+!> outlines. A grain may have several convex pieces, as a cross has. If grains differ in size, all lengths are
+!> multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
    use polydem_elementary, only: hypotenuse, sine_and_cosine
+   use polydem_grain_list, only: area_of_grain, grain_t, grains_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_outlines, only: as_corners, pi, rectangle
-   use polydem_polygon, only: mass_properties
-   use polydem_polygon_list, only: polygon_list_t
    use polydem_random, only: random_t
    use polydem_random_polygon, only: draw_random_polygon
    use polydem_settings, only: grains_settings_t
@@ -18,57 +18,16 @@ module polydem_grains
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: grain_t, grains_t, draw_grains, append_grains, settled_area, greatest_length, most_corners_of
+   public :: draw_grains, append_grains, settled_area, greatest_length, most_corners_of, most_pieces_of, &
+             corners_of_polygons, pieces_of_outlines
 
    !> Total area of the ellipses around the grains of a settled bed over the area of the bed
    real(wp), parameter :: settled_fraction = 0.895_wp
-
-   !> One grain without a position
-   type :: grain_t
-      !> Corners relative to an inner point (the centre of the ellipse), anticlockwise, (2, corner) [m]
-      real(wp), allocatable :: corners(:, :)
-      !> Upper bound of twice the distance of a corner from that point, such as the long axis of the ellipse [m]
-      real(wp) :: length = 0.0_wp
-      !> Area of the polygon [m2]
-      real(wp) :: area = 0.0_wp
-   end type grain_t
-
-   !> Grains without positions, in little memory: a list of their corners
-   type, extends(polygon_list_t) :: grains_t
-      !> As in `grain_t`, (grain)
-      real(wp), allocatable :: length(:), area(:)
-   contains
-      procedure :: start
-      procedure :: append
-   end type grains_t
 
    !> Number of the piece of each corner of a cross
    integer(ip), parameter :: pieces_of_cross(12) = [spread(0_ip, 1, 4), spread(1_ip, 1, 4), spread(2_ip, 1, 4)]
 
 contains
-
-   !> Make room for all grains.
-   subroutine start(self, n, most_corners)
-      class(grains_t), intent(inout) :: self
-      !> Number of grains
-      integer(ip), intent(in) :: n
-      !> Greatest number of corners of a grain
-      integer(ip), intent(in) :: most_corners
-
-      allocate (self%length(n), self%area(n))
-      call self%reserve(n, int(n, lp)*int(most_corners, lp))
-   end subroutine start
-
-   !> Append a grain.
-   pure subroutine append(self, corners, length, area)
-      class(grains_t), intent(inout) :: self
-      !> Corners, length and area as in `grain_t`
-      real(wp), intent(in) :: corners(:, :), length, area
-
-      call self%append_polygon(corners)
-      self%length(self%n) = length
-      self%area(self%n) = area
-   end subroutine append
 
    !> Draw grains of random shape and orientation, in descending order of size.
    subroutine draw_grains(group, random, n, grains)
@@ -79,41 +38,35 @@ contains
       integer(ip), intent(in) :: n
       !> Grains to draw
       type(grains_t), intent(out) :: grains
-      real(wp), allocatable :: corners(:, :), sizes(:)
-      real(wp) :: length, area, centroid(2), second_moment
+      type(grain_t) :: grain
+      real(wp), allocatable :: sizes(:)
       integer(ip) :: k
 
       call grains%start(n, int(most_corners_of(group), ip))
       sizes = sizes_of(group, n)
       do k = 1_ip, n
-         select case (group%shape)
-         case ('regular')
-            call draw_regular(group, sizes(k), random, corners, length)
-         case ('random')
-            length = sizes(k)*random%between(group%diameter(1), group%diameter(2))
-            call draw_random_polygon(random, random%whole(group%corners(1), group%corners(2)), length, &
-                                     length/group%elongation, corners)
-            call turn_at_random(group, random, corners)
-            length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))
-         case ('rectangle')
-            corners = sizes(k)*rectangle(-0.5_wp*group%width, 0.5_wp*group%width, -0.5_wp*group%height, &
-                                         0.5_wp*group%height)
-            length = sizes(k)*greatest_length(group)
-            call turn_at_random(group, random, corners)
-         case ('cross')
-            corners = sizes(k)*hull_of_cross(group%width, group%arm)
-            length = sizes(k)*greatest_length(group)
-            call turn_at_random(group, random, corners)
-         case ('outline')
-            corners = sizes(k)*chosen_outline(group, random, k)
-            length = sizes(k)*greatest_length(group)
-            call turn_at_random(group, random, corners)
-         case default
-            call draw_corners(group, sizes(k), random, corners, length)
-         end select
-         call mass_properties(corners, area, centroid, second_moment)
-         if (group%shape == 'cross') area = sizes(k)**2*group%arm*(2.0_wp*group%width - group%arm)
-         call grains%append(corners, length, area)
+         if (allocated(grain%piece)) deallocate (grain%piece)
+         associate (length => grain%length)
+            select case (group%shape)
+            case ('regular')
+               call draw_regular(group, sizes(k), random, grain%corners, length)
+            case ('random')
+               length = sizes(k)*random%between(group%diameter(1), group%diameter(2))
+               call draw_random_polygon(random, random%whole(group%corners(1), group%corners(2)), length, &
+                                        length/group%elongation, grain%corners)
+               call turn_at_random(group, random, grain%corners)
+               length = 2.0_wp*maxval(hypotenuse(grain%corners(1, :), grain%corners(2, :)))
+            case ('rectangle', 'cross', 'outline')
+               call choose_outline(group, random, k, grain)
+               grain%corners = sizes(k)*grain%corners
+               length = sizes(k)*greatest_length(group)
+               call turn_at_random(group, random, grain%corners)
+            case default
+               call draw_corners(group, sizes(k), random, grain%corners, length)
+            end select
+         end associate
+         grain%area = area_of_grain(grain)
+         call grains%append(grain)
       end do
    end subroutine draw_grains
 
@@ -144,34 +97,86 @@ contains
    pure integer(lp) function most_corners_of(group)
       !> Shape of the grains
       type(grains_settings_t), intent(in) :: group
+      integer :: first, k
 
       most_corners_of = max(4_lp, int(group%corners(2), lp))
-      if (size(group%outline_corners) > 0) then
-         most_corners_of = max(most_corners_of, int(maxval(group%outline_corners), lp))
-      else
-         most_corners_of = max(most_corners_of, size(group%outline, kind=lp)/2_lp)
+      if (group%shape == 'cross') most_corners_of = 12_lp
+      if (group%shape == 'outline') then
+         associate (corners => corners_of_polygons(group), pieces => pieces_of_outlines(group))
+            first = 0
+            do k = 1, size(pieces)
+               most_corners_of = max(most_corners_of, sum(int(corners(first + 1:first + pieces(k)), lp)))
+               first = first + pieces(k)
+            end do
+         end associate
       end if
    end function most_corners_of
 
-   !> The outline of a grain: the only one, a random one, or the next one
-   function chosen_outline(group, random, k) result(corners)
+   !> Greatest number of pieces of a grain
+   pure integer(ip) function most_pieces_of(group)
+      !> Shape of the grains
+      type(grains_settings_t), intent(in) :: group
+
+      most_pieces_of = 1_ip
+      if (group%shape == 'cross') most_pieces_of = 3_ip
+      if (group%shape == 'outline') most_pieces_of = maxval(pieces_of_outlines(group))
+   end function most_pieces_of
+
+   !> Number of corners of each convex polygon of the outlines of a group
+   pure function corners_of_polygons(group) result(corners)
+      !> The group
+      type(grains_settings_t), intent(in) :: group
+      integer(ip), allocatable :: corners(:)
+
+      if (size(group%outline_corners) > 0) then
+         corners = group%outline_corners
+      else
+         corners = [size(group%outline, kind=ip)/2_ip]
+      end if
+   end function corners_of_polygons
+
+   !> Number of convex polygons of each outline of a group
+   pure function pieces_of_outlines(group) result(pieces)
+      !> The group
+      type(grains_settings_t), intent(in) :: group
+      integer(ip), allocatable :: pieces(:)
+
+      if (size(group%outline_pieces) > 0) then
+         pieces = group%outline_pieces
+      else
+         allocate (pieces(max(1, size(group%outline_corners))), source=1_ip)
+      end if
+   end function pieces_of_outlines
+
+   !> Choose the outline of a grain: the only one, a random one, or the next one.
+   subroutine choose_outline(group, random, k, grain)
       type(grains_settings_t), intent(in) :: group
       type(random_t), intent(inout) :: random
       !> Number of the grain
       integer(ip), intent(in) :: k
-      real(wp), allocatable :: corners(:, :)
-      integer(ip) :: choice, first, n
+      !> Its corners and pieces are set
+      type(grain_t), intent(inout) :: grain
+      integer(ip) :: choice, first, n, p
 
-      n = size(group%outline_corners, kind=ip)
-      if (n == 0_ip) then
-         corners = as_corners(group%outline)
-         return
-      end if
-      choice = 1_ip + modulo(k - 1_ip, n)
-      if (group%outline_choice == 'random') choice = random%whole(1_ip, n)
-      first = 2_ip*sum(group%outline_corners(:choice - 1_ip))
-      corners = as_corners(group%outline(first + 1_ip:first + 2_ip*group%outline_corners(choice)))
-   end function chosen_outline
+      select case (group%shape)
+      case ('rectangle')
+         grain%corners = rectangle(-0.5_wp*group%width, 0.5_wp*group%width, -0.5_wp*group%height, 0.5_wp*group%height)
+      case ('cross')
+         grain%corners = cross(group%width, group%arm)
+         grain%piece = pieces_of_cross
+      case default
+         associate (pieces => pieces_of_outlines(group), corners => corners_of_polygons(group))
+            n = size(pieces, kind=ip)
+            choice = 1_ip + modulo(k - 1_ip, n)
+            if (group%outline_choice == 'random' .and. size(group%outline_corners) > 0) choice = random%whole(1_ip, n)
+            first = sum(pieces(:choice - 1_ip))
+            associate (mine => corners(first + 1_ip:first + pieces(choice)), before => 2_ip*sum(corners(:first)))
+               grain%corners = as_corners(group%outline(before + 1_ip:before + 2_ip*sum(mine)))
+               if (size(mine) > 1) grain%piece = [(spread(p - 1_ip, 1, mine(p)), p=1_ip, size(mine, kind=ip))]
+            end associate
+         end associate
+      end select
+   end subroutine choose_outline
 
    !> Append grains to the list of bodies in the given order or, if the order is 'descending', from right to left.
    !>
@@ -200,7 +205,7 @@ contains
       allocate (order(size(centres, 2)))
       order = [(k, k=1_ip, size(order, kind=ip))]
       if (group%order == 'descending') call sort_reals(-centres(1, :), order)
-      if (group%shape == 'cross') list%most_pieces = max(list%most_pieces, 3_ip)
+      list%most_pieces = max(list%most_pieces, grains%most_pieces())
       do j = 1_ip, size(order, kind=ip)
          k = order(j)
          if (list%leaves_next()) then
@@ -210,47 +215,24 @@ contains
          corners = grains%polygon(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
-         if (group%shape == 'cross') then
-            call list%append(cross_in(corners, group%arm/group%width), density=density, velocity=velocities(:, k), &
-                             angular_velocity=spins(k), material=material, piece=pieces_of_cross)
-            cycle
-         end if
          call list%append(corners, density=density, velocity=velocities(:, k), angular_velocity=spins(k), &
-                          material=material)
+                          material=material, piece=grains%pieces_of(k))
       end do
    end subroutine append_grains
 
-   !> Convex hull of a cross, (2, 8) [m]
-   pure function hull_of_cross(width, arm) result(corners)
+   !> Corners of the pieces of a cross: a bar from end to end, and an arm on either side of it, (2, 12) [m]
+   pure function cross(width, arm) result(corners)
       !> Distance of opposite ends, and width of the arms [m]
       real(wp), intent(in) :: width, arm
-      real(wp) :: corners(2, 8)
+      real(wp) :: corners(2, 12)
       real(wp) :: w, a
 
       w = 0.5_wp*width
       a = 0.5_wp*arm
-      corners = reshape([w, -a, w, a, a, w, -a, w, -w, a, -w, -a, -a, -w, a, -w], [2, 8])
-   end function hull_of_cross
-
-   !> The pieces of a cross with a given hull: a bar from end to end, and an arm on either side of it
-   pure function cross_in(hull, ratio) result(corners)
-      !> Corners of the hull as `hull_of_cross` makes them, turned and moved (2, 8) [m]
-      real(wp), intent(in) :: hull(:, :)
-      !> Width of the arms over the width of the cross
-      real(wp), intent(in) :: ratio
-      real(wp) :: corners(2, 12)
-      real(wp) :: near, far
-
-      near = 0.5_wp*(1.0_wp - ratio)
-      far = 0.5_wp*(1.0_wp + ratio)
-      corners(:, 1:4) = hull(:, [1, 2, 5, 6])
-      corners(:, 5) = hull(:, 2) + near*(hull(:, 5) - hull(:, 2))
-      corners(:, 6:7) = hull(:, 3:4)
-      corners(:, 8) = hull(:, 2) + far*(hull(:, 5) - hull(:, 2))
-      corners(:, 9) = hull(:, 6) + near*(hull(:, 1) - hull(:, 6))
-      corners(:, 10:11) = hull(:, 7:8)
-      corners(:, 12) = hull(:, 6) + far*(hull(:, 1) - hull(:, 6))
-   end function cross_in
+      corners(:, 1:4) = rectangle(-w, w, -a, a)
+      corners(:, 5:8) = rectangle(-a, a, a, w)
+      corners(:, 9:12) = rectangle(-a, a, -w, -a)
+   end function cross
 
    !> Area of a settled bed of grains, voids included [m2]
    pure real(wp) function settled_area(group, n)

@@ -5,7 +5,7 @@
 module polydem_packing
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t
-   use polydem_grains, only: grain_t, grains_t
+   use polydem_grain_list, only: grain_t, grains_t
    use polydem_kinds, only: ip, wp
    use polydem_outlines, only: pi
    use polydem_patch, only: patch_t, read_patch
@@ -58,9 +58,7 @@ contains
       end do
       call grains%start(n, most)
       do k = 1_ip, n
-         associate (grain => patch%grains(source(k)))
-            call grains%append(grain%corners, grain%length, grain%area)
-         end associate
+         call grains%append(patch%grains(source(k)))
       end do
    end subroutine pack_grains
 

@@ -60,7 +60,8 @@ contains
       grains%outline_choice = 'random'
       grains%elongation = 1.0_wp
       grains%size_spread = 1.0_wp
-      allocate (grains%vertices(0), grains%outline(0), grains%outline_corners(0), grains%grading(0))
+      allocate (grains%vertices(0), grains%outline(0), grains%outline_corners(0), grains%outline_pieces(0), &
+                grains%grading(0))
    end function new_grains
 
    !> A wall without an outline. All other components have the values of unused entries

@@ -8,8 +8,9 @@ module polydem_patch
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: grain_t
+   use polydem_grain_list, only: area_of_grain, corners_of_piece, grain_t
    use polydem_kinds, only: ip, wp
+   use polydem_polygon, only: mass_properties
    use polydem_sort_reals, only: sort_reals
    use polydem_trajectory_reader, only: read_packing
    implicit none
@@ -59,10 +60,6 @@ contains
       integer(ip), allocatable :: chosen(:), order(:)
       integer(ip) :: k
 
-      if (bodies%pieces%most > 1_ip) then
-         call raise(error, input_error, 'its bodies have several pieces; a packing is made of convex grains only')
-         return
-      end if
       centres = bodies%position(:, bodies%free)
       call find_middle(centres, low, high, distance)
       if (any(.not. high - low > least_size*distance)) then
@@ -82,6 +79,8 @@ contains
          patch%centres(:, k) = centres(:, chosen(k)) - low
          associate (s => bodies%free(chosen(k)))
             patch%grains(k)%corners = bodies%pieces%turned_polygon(s)
+            if (bodies%pieces%most > 1_ip) patch%grains(k)%piece = bodies%pieces%numbers_of(s)
+            patch%grains(k)%area = area_of_grain(patch%grains(k))
          end associate
          associate (corners => patch%grains(k)%corners)
             patch%grains(k)%length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))
@@ -150,7 +149,6 @@ contains
    pure logical function meets_copy(patch, j, k)
       type(patch_t), intent(in) :: patch
       integer(ip), intent(in) :: j, k
-      type(overlap_t) :: overlap
       real(wp) :: offset(2), near
       integer :: column, row
 
@@ -161,10 +159,56 @@ contains
             if (row == 0 .and. column == 0) cycle
             offset = patch%centres(:, j) - patch%centres(:, k) + [column, row]*patch%period
             if (any(abs(offset) > near)) cycle
-            call overlap_polygons(patch%grains(k)%corners, patch%grains(j)%corners, offset, 0_ip, overlap)
-            if (overlap%area > 0.0_wp) meets_copy = .true.
+            meets_copy = meets_copy .or. overlap_grains(patch%grains(k), patch%grains(j), offset)
          end do
       end do
    end function meets_copy
+
+   !> Whether any pieces of two grains overlap
+   pure logical function overlap_grains(a, b, offset)
+      type(grain_t), intent(in) :: a, b
+      !> Centre of b minus centre of a [m]
+      real(wp), intent(in) :: offset(2)
+      type(overlap_t) :: overlap
+      real(wp), allocatable :: p(:, :), q(:, :)
+      real(wp) :: centre_p(2), centre_q(2)
+      integer(ip) :: j, k
+
+      overlap_grains = .false.
+      do k = 0_ip, last_piece(a)
+         call take_piece(a, k, p, centre_p)
+         do j = 0_ip, last_piece(b)
+            call take_piece(b, j, q, centre_q)
+            call overlap_polygons(p, q, offset + centre_q - centre_p, 0_ip, overlap)
+            if (overlap%area > 0.0_wp) overlap_grains = .true.
+         end do
+      end do
+   end function overlap_grains
+
+   !> Number of the last piece of a grain, from 0
+   pure integer(ip) function last_piece(grain)
+      type(grain_t), intent(in) :: grain
+
+      last_piece = 0_ip
+      if (allocated(grain%piece)) last_piece = maxval(grain%piece)
+   end function last_piece
+
+   !> Take a piece of a grain, relative to its own centre if the grain has several.
+   pure subroutine take_piece(grain, k, corners, centre)
+      type(grain_t), intent(in) :: grain
+      !> Number of the piece
+      integer(ip), intent(in) :: k
+      real(wp), allocatable, intent(out) :: corners(:, :)
+      !> The centre relative to that of the grain [m]
+      real(wp), intent(out) :: centre(2)
+      real(wp) :: area, second_moment
+
+      corners = grain%corners
+      centre = 0.0_wp
+      if (.not. allocated(grain%piece)) return
+      corners = corners_of_piece(grain%corners, grain%piece, k)
+      call mass_properties(corners, area, centre, second_moment)
+      corners = corners - spread(centre, 2, size(corners, 2))
+   end subroutine take_piece
 
 end module polydem_patch

@@ -5,7 +5,8 @@ module polydem_place_parts
    use polydem_column, only: pile_up
    use polydem_errors, only: error_t, input_error, raise
    use polydem_fit, only: explain
-   use polydem_grains, only: append_grains, draw_grains, grains_t, greatest_length, most_corners_of
+   use polydem_grain_list, only: grain_t, grains_t
+   use polydem_grains, only: append_grains, draw_grains, greatest_length, most_corners_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_outline_file, only: find_outlines
    use polydem_outlines, only: are_apart
@@ -154,9 +155,9 @@ contains
       type(region_t) :: region
       type(random_t) :: random
       type(grains_t) :: grains
-      real(wp), allocatable :: centres(:, :), velocities(:, :), spins(:), corners(:, :)
+      real(wp), allocatable :: centres(:, :), velocities(:, :), spins(:)
       real(wp) :: density
-      integer(ip) :: k, material, n_found, seed
+      integer(ip) :: material, n_found, seed
 
       group = parts%grains(number)
       if (group%material == '') group%material = settings%scene%material
@@ -190,12 +191,24 @@ contains
       if (group%arrangement == 'packing') &
          call rotate_with_walls(settings%motion, group%wall, centres, velocities, spins)
       call append_grains(list, group, density, material, grains, centres, velocities, spins)
-      if (number == size(parts%grains)) return
-      do k = 1_ip, group%number
-         corners = grains%polygon(k)
-         call placed%append_polygon(corners + spread(centres(:, k), 2, size(corners, 2)))
-      end do
+      if (number < size(parts%grains)) call add_pieces(grains, centres, placed)
    end subroutine list_group
+
+   !> Add the pieces of grains to the polygons that later groups must leave.
+   subroutine add_pieces(grains, centres, placed)
+      type(grains_t), intent(in) :: grains
+      real(wp), intent(in) :: centres(:, :)
+      type(polygon_list_t), intent(inout) :: placed
+      real(wp), allocatable :: corners(:, :)
+      integer(ip) :: k, p
+
+      do k = 1_ip, grains%n
+         do p = 0_ip, grains%n_pieces(k) - 1_ip
+            corners = grains%piece_polygon(k, p)
+            call placed%append_polygon(corners + spread(centres(:, k), 2, size(corners, 2)))
+         end do
+      end do
+   end subroutine add_pieces
 
    !> Fill a region with blocks, or arrange grains in it.
    subroutine fill_region(group, region, seed, random, grains, centres, n_found, problem, error)
@@ -232,6 +245,7 @@ contains
       real(wp), allocatable, intent(out) :: centres(:, :)
       type(problem_t), intent(inout) :: problem
       type(error_t), allocatable :: too_heavy
+      type(grain_t) :: grain
       real(wp), allocatable :: corners(:, :, :)
       integer(ip) :: materials(size(wall_of)), k
 
@@ -251,8 +265,11 @@ contains
       end if
       centres = 0.0_wp
       call grains%start(group%number, 4_ip)
+      grain%length = greatest_length(group)
+      grain%area = group%width*group%height
       do k = 1_ip, group%number
-         call grains%append(corners(:, :, k), greatest_length(group), group%width*group%height)
+         grain%corners = corners(:, :, k)
+         call grains%append(grain)
       end do
    end subroutine place_bodies
 

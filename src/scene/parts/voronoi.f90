@@ -5,7 +5,7 @@
 !> (IEEE Trans. Inf. Theory 28 (1982) 129) all points move to the centroids of their cells, which become more alike.
 module polydem_voronoi
    use polydem_elementary, only: hypotenuse
-   use polydem_grains, only: grains_t
+   use polydem_grain_list, only: grain_t, grains_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_outlines, only: contains_all
    use polydem_polygon, only: mass_properties
@@ -83,11 +83,13 @@ contains
       type(grains_t), intent(inout) :: grains
       !> Its centroid [m]
       real(wp), intent(out) :: centre(2)
-      real(wp) :: arms(2, size(corners, 2)), area, moment
+      type(grain_t) :: grain
+      real(wp) :: moment
 
-      call mass_properties(corners, area, centre, moment)
-      arms = corners - spread(centre, 2, size(corners, 2))
-      call grains%append(arms, 2.0_wp*maxval(hypotenuse(arms(1, :), arms(2, :))), area)
+      call mass_properties(corners, grain%area, centre, moment)
+      grain%corners = corners - spread(centre, 2, size(corners, 2))
+      grain%length = 2.0_wp*maxval(hypotenuse(grain%corners(1, :), grain%corners(2, :)))
+      call grains%append(grain)
    end subroutine append_block
 
    !> Draw points that are uniformly distributed over the region.

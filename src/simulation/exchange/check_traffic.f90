@@ -5,7 +5,7 @@ module polydem_check_traffic
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_exchange_bodies, only: meets_fixed
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: lp, wp
    use polydem_random, only: random_t
    use polydem_simulation, only: simulation_t
    use polydem_source, only: candidate_t, source_t
@@ -41,14 +41,19 @@ contains
                stream = source%shapes
                do j = 1, n_sample
                   call source%draw_shape(stream, candidate)
-                  call list%append(candidate%corners, density=source%density, material=source%material)
+                  call list%append(candidate%corners, density=source%density, material=source%material, &
+                                   piece=candidate%piece)
                end do
+               list%most_pieces = max(list%most_pieces, source%most_pieces())
             end associate
          end do
       end if
       call new_bodies(list, sample, error)
-      if (allocated(error)) error%message = place_of(self%settings, &
-         'source.'//self%traffic%sources(1)%settings%name, 'name')//': the bodies of &source: '//error%message
+      if (.not. allocated(error)) return
+      associate (source => self%traffic%sources((error%place - 1_lp)/n_sample + 1_lp)%settings)
+         error%message = place_of(self%settings, 'source.'//source%name, 'name')//': the bodies of &source '// &
+            source%name//': '//error%message
+      end associate
    end subroutine draw_sample
 
    !> Check that there is room for the first bodies of each source.
@@ -60,8 +65,6 @@ contains
       integer :: k
 
       if (.not. allocated(self%traffic)) return
-      if (self%bodies%pieces%most > 1_ip) call raise(error, input_error, place_of(self%settings, 'grains', 'shape')// &
-         ': bodies of several pieces cannot be combined with &source and &sink; leave these out, or give convex bodies')
       do k = 1, size(self%traffic%sources)
          if (.not. allocated(error)) call check_source(self, self%traffic%sources(k), error)
       end do

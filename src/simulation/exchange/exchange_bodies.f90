@@ -309,7 +309,7 @@ contains
       !> Centre and radius [m]
       real(wp), intent(in) :: centre(2), radius
       real(wp) :: offset(2), folds(2)
-      integer(ip) :: s
+      integer(ip) :: p, pieces(2), s
 
       meets_fixed = .true.
       do s = 1_ip, bodies%n
@@ -322,7 +322,10 @@ contains
          if (allocated(bodies%folds)) folds = bodies%folds(:, s)
          offset = nearest_copy(bodies%cell, folds, offset)
          if (hypotenuse(offset(1), offset(2)) >= radius + bodies%radius(s)) cycle
-         if (distance_from(bodies%pieces%turned_polygon(s), offset) < radius) return
+         pieces = bodies%pieces%pieces_of(s)
+         do p = pieces(1), pieces(2)
+            if (distance_from(bodies%pieces%turned_piece(p), offset) < radius) return
+         end do
       end do
       meets_fixed = .false.
    end function meets_fixed
@@ -385,7 +388,7 @@ contains
       type(body_list_t), intent(inout) :: list
 
       call list%append(candidate%corners + spread(place, 2, size(candidate%corners, 2)), density=source%density, &
-                       velocity=source%settings%velocity, material=source%material)
+                       velocity=source%settings%velocity, material=source%material, piece=candidate%piece)
       source%entered = source%entered + 1_lp
       source%shapes = candidate%after
    end subroutine append_candidate

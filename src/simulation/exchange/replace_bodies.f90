@@ -51,8 +51,8 @@ contains
       integer(ip), allocatable :: removed(:), slots(:)
       integer(ip) :: s
 
-      if (self%bodies%last_id > huge(1_ip) - 1_ip - added%n_all) call raise(error, run_error, 'step '// &
-         to_text(self%step)//': there are no identifiers for more bodies')
+      if (self%bodies%last_id > huge(1_ip)/self%bodies%pieces%most - 1_ip - added%n_all) call raise(error, run_error, &
+         'step '//to_text(self%step)//': there are no identifiers for more bodies')
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call list_removed(self%comm, self%bodies, kept, removed)
@@ -63,7 +63,7 @@ contains
       if (added%n_all > 0_ip) then
          if (allocated(self%bodies%material) .and. .not. allocated(added%material)) &
             allocate (added%material(added%n), source=0_ip)
-         call give_most(added, self%bodies%pieces%most)
+         call added%pieces%allow(self%bodies%pieces%most)
          call start_added(self, added, entering)
          call set_cell(added, self%bodies%cell)
          slots = [(s, s=1_ip, added%n)]
@@ -85,18 +85,6 @@ contains
       end if
       call settle_bodies(self, error)
    end subroutine replace_bodies
-
-   !> Make the pieces of new bodies like those of the run, whose bodies have up to `most` pieces.
-   subroutine give_most(added, most)
-      type(bodies_t), intent(inout) :: added
-      integer(ip), intent(in) :: most
-
-      added%pieces%most = max(added%pieces%most, most)
-      if (added%pieces%most == 1_ip) return
-      if (.not. allocated(added%pieces%number)) &
-         allocate (added%pieces%number(size(added%pieces%vertex, 2)), source=0_ip)
-      call added%pieces%find_pieces()
-   end subroutine give_most
 
    !> Build anew what depends on the bodies, after their set has changed or a checkpoint was read: boxes, guards, an
    !> empty list of pairs. The ranks forget their halos. Collective; all ranks get the same error.

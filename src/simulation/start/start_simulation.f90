@@ -63,6 +63,7 @@ contains
       if (allocated(error)) return
       call draw_sample(self, sample, error)
       if (allocated(error)) return
+      call self%bodies%pieces%allow(sample%pieces%most)
       call choose_step(self, sample, error)
       if (allocated(error)) return
       call self%body_forces%configure(self%settings%forces)
