@@ -4,7 +4,8 @@
 !> missed as long as half the cell is longer than two bodies reach together; then at most one copy of a body can touch.
 !>
 !> In a *sheared* cell the copies above and below move along x, the upper one by `shift` with the velocity `jump`
-!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields.
+!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields. A cell
+!> at rest whose copies are displaced, at the start from a sheared result, is one with the rate 0.
 !>
 !> A cell that *yields* has a size that obeys a stress (`polydem_cell_load`).
 module polydem_cell
@@ -54,6 +55,8 @@ module polydem_cell
       logical :: is_sheared = .false.
       !> Rate of the shear [1/s], and time in which it smoothly reaches this rate [s]
       real(wp) :: rate = 0.0_wp, ramp = 0.0_wp
+      !> Displacement of the copy above at time 0, that of the result from which the run starts [m]
+      real(wp) :: first_shift = 0.0_wp
       !> Displacement of the copy above, from 0 to the width [m], and its velocity [m/s]
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Both at the start of the step
@@ -68,13 +71,15 @@ module polydem_cell
 contains
 
    !> A cell that is periodic along some axes
-   pure function new_cell(axes, low, size, rate, ramp) result(cell)
+   pure function new_cell(axes, low, size, rate, ramp, first_shift) result(cell)
       !> 'none', 'x', 'y' or 'xy'
       character(len=*), intent(in) :: axes
       !> Lower left corner, and width and height; only those along periodic axes are used [m]
       real(wp), intent(in) :: low(2), size(2)
       !> Rate of the shear, 0 if there is none [1/s], and its ramp [s]
       real(wp), intent(in) :: rate, ramp
+      !> Displacement of the copy above at time 0 [m]
+      real(wp), intent(in) :: first_shift
       type(cell_t) :: cell
       integer :: axis
 
@@ -85,7 +90,8 @@ contains
          cell%size(axis) = size(axis)
          cell%inverse(axis) = 1.0_wp/size(axis)
       end do
-      cell%is_sheared = abs(rate) > 0.0_wp
+      cell%first_shift = merge(first_shift, 0.0_wp, all(cell%size > 0.0_wp))
+      cell%is_sheared = abs(rate) > 0.0_wp .or. abs(cell%first_shift) > 0.0_wp
       cell%rate = rate
       cell%ramp = ramp
       call shear_cell(cell, 0.0_wp, 0.0_wp)
@@ -147,7 +153,7 @@ contains
          factor = u*u*(3.0_wp - 2.0_wp*u)
       end if
       jump = cell%rate*cell%size(2)*factor
-      shift = modulo(cell%rate*cell%size(2)*elapsed, cell%size(1))
+      shift = modulo(cell%first_shift + cell%rate*cell%size(2)*elapsed, cell%size(1))
    end subroutine find_shear
 
    !> The vector to the nearest copy of where a vector leads [m]

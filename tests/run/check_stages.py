@@ -148,6 +148,31 @@ def a_cell_that_obeyed_a_stress_keeps_its_size(case):
         assert deepest is None or float(deepest.group(1)) < 0.05, output
 
 
+def a_sheared_cell_goes_on_where_it_was(case):
+    """Finds a start whose copies above are not where those of the result were. All times and shifts are exact."""
+    cell = "&cell periodic = 'xy' size = 0.125, 0.125 {shear} /\n"
+    rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT
+    short, sheared = rest.format(duration="duration = 7.8125e-3", scheme=""), cell.format(shear="shear_rate = 96")
+    begin, start = sheared + GAS.replace("high = 0.1, 0.1 number = 60", "high = 0.125, 0.125 number = 110"), "&scene name = 'result' start_from = '{}' /\n"
+    whole = case.run(begin + rest.format(duration="duration = 0.015625", scheme=""), "sheared")
+    case.run(begin + short, "half")
+    for how in ({}, {"ranks": 3})[:2 if case.parallel else 1]:
+        assert hash_of(case.run(sheared + start.format("half") + short, "again", "--force", **how)) == hash_of(whole)
+    killed = case.start(sheared + start.format("half") + short, "stopped", "--set", "checkpoint.steps=64")
+    time.sleep(0.1)
+    killed.kill()
+    killed.communicate()
+    assert hash_of(case.run(sheared + start.format("half") + short, "stopped", "--continue", "--set",
+                            "checkpoint.steps=64")) == hash_of(whole)
+    # Copies stay displaced when the shear ends, and a cell without shear can be sheared.
+    depths = []
+    for k, (origin, shear) in enumerate((("half", ""), ("half:7", ""), ("rests_0", "shear_rate = 96"))):
+        output = case.run(cell.format(shear=shear) + start.format(origin) + short, f"rests_{k}")
+        found = re.search(r"the deepest (\S+) m between", output)
+        depths.append(float(found.group(1)) if found else 0.0)
+    assert max(depths) < 2e-3, depths
+
+
 def pieces_keep_their_history(case):
     """Finds bodies that lose their pieces in a start from a result, and sources that lose those of others."""
     cross = "shape = 'cross' width = 0.009 arm = 3e-3 angle = 0, 360"
@@ -259,7 +284,7 @@ def faults_are_named(case):
 
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
-         a_cell_that_obeyed_a_stress_keeps_its_size, pieces_keep_their_history,
+         a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was, pieces_keep_their_history,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
 

@@ -11,7 +11,19 @@ module polydem_frame_reader
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: find_frame, list_frame, read_cell_size, read_most_pieces
+   public :: surroundings_t, find_frame, list_frame, read_surroundings
+
+   !> What a checkpoint or a frame says of the periodic cell and of pieces
+   type :: surroundings_t
+      !> Width and height of a cell that obeys a stress; 0 if the size of the cell is constant, or there is none [m]
+      real(wp) :: size(2) = 0.0_wp
+      !> Displacement of the copy above [m]
+      real(wp) :: shift = 0.0_wp
+      !> Whether a checkpoint has the cells that bodies have crossed, and the shifts of the borders that they crossed
+      logical :: has_images = .false., has_slides = .false.
+      !> Greatest number of pieces of a body, in a checkpoint
+      integer(ip) :: most_pieces = 1_ip
+   end type surroundings_t
 
 contains
 
@@ -131,52 +143,48 @@ contains
       end do
    end subroutine list_frame
 
-   !> Read the size of a cell that obeys a stress, from a checkpoint or a frame of a segment.
-   subroutine read_cell_size(path, row, size, error)
+   !> Read what a checkpoint or a frame of a segment says of the periodic cell and of pieces.
+   subroutine read_surroundings(path, row, found, error)
       !> Path of the checkpoint or segment
       character(len=*), intent(in) :: path
       !> Number of frames before this one in the segment
       integer(lp), intent(in) :: row
-      !> Width and height; 0 if the size of the cell is constant, or there is none [m]
-      real(wp), intent(out) :: size(2)
+      !> What is there
+      type(surroundings_t), intent(out) :: found
       !> Names the file and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      real(dp), allocatable :: values(:), rows(:, :)
+      integer(ip), allocatable :: most(:)
+      real(dp), allocatable :: values(:), rows(:, :), shift(:)
 
-      size = 0.0_wp
       call file%open(path, error)
       if (allocated(error)) return
+      found%has_images = file%has('/bodies/image_x', error)
+      found%has_slides = file%has('/bodies/slid', error)
       if (file%has('/run/cell', error)) then
          call file%read('/run/cell', values, error)
       else if (file%has('/frames/cell_size', error)) then
          call file%read('/frames/cell_size', rows, error, rows=[row, 1_lp])
          if (.not. allocated(error)) values = rows(:, 1)
       end if
+      if (found%has_slides) then
+         call file%read('/run/shift', shift, error)
+      else if (file%has('/frames/shift', error)) then
+         call file%read('/frames/shift', shift, error, rows=[row, 1_lp])
+      end if
+      if (file%has('/vertices/piece', error)) call file%read('/run/most_pieces', most, error)
       call file%close(error)
-      if (allocated(values) .and. .not. allocated(error)) size = real(values(1:2), wp)
-   end subroutine read_cell_size
-
-   !> Read the greatest number of pieces of a body from a checkpoint.
-   subroutine read_most_pieces(path, most, error)
-      !> Path of the checkpoint
-      character(len=*), intent(in) :: path
-      !> The number; 1 if all bodies are convex
-      integer(ip), intent(out) :: most
-      !> Names the file and what is wrong
-      type(error_t), allocatable, intent(inout) :: error
-      type(hdf5_file_t) :: file
-      integer(ip), allocatable :: value(:)
-
-      most = 1_ip
-      call file%open(path, error)
       if (allocated(error)) return
-      if (file%has('/vertices/piece', error)) call file%read('/run/most_pieces', value, error)
-      call file%close(error)
-      if (.not. allocated(value) .or. allocated(error)) return
-      if (size(value) == 1 .and. all(value >= 1_ip)) most = value(1)
-      if (size(value) /= 1 .or. any(value < 1_ip)) call raise(error, input_error, path// &
+      if (allocated(values)) then
+         if (size(values) >= 2) found%size = real(values(1:2), wp)
+      end if
+      if (allocated(shift)) then
+         if (size(shift) == 1) found%shift = real(shift(1), wp)
+      end if
+      if (.not. allocated(most)) return
+      if (size(most) == 1 .and. all(most >= 1_ip)) found%most_pieces = most(1)
+      if (size(most) /= 1 .or. any(most < 1_ip)) call raise(error, input_error, path// &
          ': /run/most_pieces is no number of pieces')
-   end subroutine read_most_pieces
+   end subroutine read_surroundings
 
 end module polydem_frame_reader

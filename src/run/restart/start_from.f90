@@ -5,6 +5,7 @@
 !> history, since evaluating them changes it. A frame has poses and velocities only.
 module polydem_start_from
    use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_checkpoint_bodies, only: read_bodies
@@ -13,7 +14,7 @@ module polydem_start_from
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
-   use polydem_frame_reader, only: find_frame, list_frame, read_cell_size, read_most_pieces
+   use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_replace_bodies, only: settle_bodies
    use polydem_result_files, only: checkpoint_path, n_checkpoints
@@ -38,6 +39,8 @@ module polydem_start_from
       integer(lp) :: row = 0_lp
       !> What the log says of it
       character(len=:), allocatable :: note
+      !> What it says of its periodic cell and of pieces
+      type(surroundings_t) :: around
    end type origin_t
 
 contains
@@ -68,6 +71,7 @@ contains
          end if
       end if
       if (.not. origin%is_frame) call find_checkpoint(folder, origin, error)
+      if (.not. allocated(error)) call read_surroundings(origin%path, origin%row, origin%around, error)
       if (allocated(error)) call blame(settings, error)
    end subroutine find_origin
 
@@ -135,9 +139,8 @@ contains
          call list_frame(origin%path, origin%row, list, error)
          if (.not. allocated(error)) call new_bodies(list, bodies, error)
       else
-         call read_most_pieces(origin%path, bodies%pieces%most, error)
-         call comm%all_reduce_error(error)
-         if (.not. allocated(error)) call file%open(origin%path, error, comm)
+         bodies%pieces%most = origin%around%most_pieces
+         call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call read_bodies(file, comm, bodies)
@@ -152,6 +155,7 @@ contains
       if (.not. allocated(error)) call check_cell_size(settings, origin, error)
       call comm%all_reduce_error(error)
       if (allocated(error)) return
+      bodies%cell%first_shift = origin%around%shift
       do s = 1_ip, bodies%n
          if (bodies%fixed(s)) call rest(bodies, s)
       end do
@@ -162,14 +166,14 @@ contains
       type(settings_t), intent(in) :: settings
       type(origin_t), intent(in) :: origin
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: size(2)
 
-      call read_cell_size(origin%path, origin%row, size, error)
-      if (allocated(error) .or. .not. all(size > 0.0_wp)) return
-      if (all(abs(settings%cell%size - size) <= 16.0_wp*epsilon(size)*size)) return
-      call raise(error, input_error, place_of(settings, 'cell', 'size')//': ''size'' in &cell: the cell of '// &
-                 origin%path//' has got another size there; write periodic = ''xy'' and size = '// &
-                 to_text(size(1), 17)//', '//to_text(size(2), 17))
+      associate (size => origin%around%size)
+         if (.not. all(size > 0.0_wp)) return
+         if (all(abs(settings%cell%size - size) <= 16.0_wp*epsilon(size)*size)) return
+         call raise(error, input_error, place_of(settings, 'cell', 'size')//': ''size'' in &cell: the cell of '// &
+                    origin%path//' has got another size there; write periodic = ''xy'' and size = '// &
+                    to_text(size(1), 17)//', '//to_text(size(2), 17))
+      end associate
    end subroutine check_cell_size
 
    !> Let a body rest.
@@ -231,16 +235,15 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(origin_t) :: origin
       type(checkpoint_file_t) :: file
-      integer(ip) :: most
 
-      call open_start(simulation, file, origin, most, error)
+      call open_start(simulation, file, origin, error)
       if (allocated(error) .or. origin%is_frame) return
       ! Here the state of the integrator is only tried.
       call file%choose_rows('/bodies/', int(simulation%bodies%global_index, lp))
       call simulation%motion%integrator%serialize(file)
       if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
          call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
-      call read_pairs(file, simulation, most)
+      call read_pairs(file, simulation, origin%around%most_pieces)
       call file%close(error)
       if (.not. allocated(error)) return
       error%message = error%message//'. The run of the result had other forces or another scheme; start from a '// &
@@ -249,17 +252,13 @@ contains
    end subroutine recall_history
 
    !> Open the checkpoint from which a simulation starts, unless it starts from a frame.
-   subroutine open_start(simulation, file, origin, most, error)
+   subroutine open_start(simulation, file, origin, error)
       type(simulation_t), intent(inout) :: simulation
       type(checkpoint_file_t), intent(inout) :: file
       type(origin_t), intent(out) :: origin
-      !> Greatest number of pieces of a body of the result
-      integer(ip), intent(out) :: most
       type(error_t), allocatable, intent(inout) :: error
 
-      most = 1_ip
       call find_origin(simulation%settings, origin, error)
-      if (.not. (allocated(error) .or. origin%is_frame)) call read_most_pieces(origin%path, most, error)
       call simulation%comm%all_reduce_error(error)
       if (.not. (allocated(error) .or. origin%is_frame)) call file%open(origin%path, error, simulation%comm)
    end subroutine open_start
@@ -273,17 +272,21 @@ contains
       type(origin_t) :: origin
       type(checkpoint_file_t) :: file
       type(bodies_t) :: before
-      integer(ip) :: most, s
+      integer(ip) :: s
 
       if (simulation%settings%scene%name /= 'result') return
-      call open_start(simulation, file, origin, most, error)
+      call open_start(simulation, file, origin, error)
       if (allocated(error) .or. origin%is_frame) return
       associate (bodies => simulation%bodies)
          before = bodies
          call file%choose_rows('/bodies/', int(bodies%global_index, lp))
+         ! The result may have had no cell, or one without shear.
+         if (.not. origin%around%has_images .and. allocated(bodies%image)) deallocate (bodies%image)
+         if (.not. origin%around%has_slides .and. allocated(bodies%slid)) deallocate (bodies%slid)
          call serialize_bodies(file, bodies)
+         call set_cell(bodies, before%cell)
          call simulation%motion%integrator%serialize(file)
-         call read_pairs(file, simulation, most)
+         call read_pairs(file, simulation, origin%around%most_pieces)
          do s = 1_ip, bodies%n
             if (.not. bodies%fixed(s)) cycle
             bodies%position(:, s) = before%position(:, s)

@@ -25,7 +25,8 @@ contains
    !> Put all bodies into the cell, if there is one, and check that it is large enough for them. Collective; all ranks
    !> get the same error.
    subroutine enter_cell(self, error)
-      !> The simulation with its settings, bodies and walls; `n_outside` counts the bodies that were outside the cell
+      !> The simulation with its settings, bodies and walls. On entry the cell of the bodies has nothing but the first
+      !> displacement of the copy above; `n_outside` counts the bodies that were outside the cell
       type(simulation_t), intent(inout) :: self
       !> Names a body that is too large for the cell
       type(error_t), allocatable, intent(inout) :: error
@@ -36,7 +37,8 @@ contains
       if (self%settings%cell%periodic == 'none') return
       associate (bodies => self%bodies, settings => self%settings)
          call set_cell(bodies, new_cell(settings%cell%periodic, settings%cell%low, settings%cell%size, &
-                                       settings%cell%shear_rate, settings%cell%shear_ramp))
+                                       settings%cell%shear_rate, settings%cell%shear_ramp, &
+                                       bodies%cell%first_shift))
          if (settings%cell%obeys /= 'none') call let_yield(settings, bodies%cell)
          call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
          call find_folds(bodies)
