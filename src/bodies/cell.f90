@@ -4,8 +4,8 @@
 !> missed as long as half the cell is longer than two bodies reach together; then at most one copy of a body can touch.
 !>
 !> In a *sheared* cell the copies above and below move along x, the upper one by `shift` with the velocity `jump`
-!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields. A cell
-!> at rest whose copies are displaced, at the start from a sheared result, is one with the rate 0.
+!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields. A
+!> cell at rest whose copies are displaced, at the start from a sheared result, is one with the rate 0.
 !>
 !> A cell that *yields* has a size that obeys a stress (`polydem_cell_load`).
 module polydem_cell

@@ -2,6 +2,7 @@
 module polydem_finish
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_counters, only: counters_t
+   use polydem_end_warnings, only: write_end_warnings
    use polydem_energy_report, only: write_energy_report
    use polydem_errors, only: error_t, run_error
    use polydem_global_hash, only: hash_all_bodies
@@ -75,6 +76,7 @@ contains
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)
          if (s%settings%output%energy_balance) call write_energy_report(s, run%log)
+         if (.not. allocated(error)) call write_end_warnings(s, run%log)
          call write_warning_counts(run%monitor, run%log)
          if (allocated(error)) call run%log%write_line('stopped: '//status)
          call write_hash(run%log, hexadecimal(hash))

@@ -27,7 +27,7 @@ contains
       allocate (traffic)
       allocate (traffic%sources(size(settings%source)), traffic%sinks(size(settings%sink)))
       traffic%departures%name = 'departures'
-      call set_departure(traffic%departures%row, 0_lp, 0_lp, [real(wp) :: 0, 0, 0, 0, 0])
+      call set_departure(traffic%departures%row, 0_lp, 0_lp, [real(wp) :: 0, 0, 0, 0, 0, 0])
       do k = 1_ip, size(traffic%sources, kind=ip)
          associate (given => settings%source(k))
             seed = given%seed

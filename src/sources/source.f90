@@ -5,7 +5,7 @@
 !> grains are therefore not preferred. All ranks draw the same numbers.
 module polydem_source
    use polydem_elementary, only: hypotenuse
-   use polydem_grain_list, only: grains_t
+   use polydem_grain_list, only: area_of_grain, grain_t, grains_t
    use polydem_grains, only: draw_grains, most_pieces_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_parts, only: new_grains
@@ -20,6 +20,8 @@ module polydem_source
    !> Greatest number of bodies that enter at a time, and number of places that are tried for each of them
    integer(lp), parameter :: most_at_once = 500_lp
    integer, parameter :: n_tries = 20
+   !> Number of bodies of which the mean mass is told
+   integer, parameter :: n_sample = 1000
 
    !> A source
    type :: source_t
@@ -33,6 +35,8 @@ module polydem_source
       real(wp) :: density = 0.0_wp
       !> Number of bodies that have entered, and of times at which one found no room
       integer(lp) :: entered = 0_lp, blocked = 0_lp
+      !> Step since which bodies enter at the present rate, and number of those that had entered then
+      integer(lp) :: since = 0_lp, before = 0_lp
       !> Mass that has entered [kg/m]
       real(wp) :: mass = 0.0_wp
       !> Random numbers of shapes and of places
@@ -40,9 +44,11 @@ module polydem_source
    contains
       procedure, private :: as_group
       procedure :: most_pieces
+      procedure :: mean_mass
       procedure :: draw_shape
       procedure :: draw_candidates
       procedure :: wanted
+      procedure :: due
       procedure :: serialize
    end type source_t
 
@@ -132,6 +138,25 @@ contains
       most_pieces = most_pieces_of(self%as_group())
    end function most_pieces
 
+   !> Mean mass of the first bodies [kg/m]
+   function mean_mass(self) result(mean)
+      class(source_t), intent(in) :: self
+      real(wp) :: mean
+      type(candidate_t) :: candidate
+      type(grain_t) :: grain
+      type(random_t) :: stream
+      integer :: k
+
+      mean = 0.0_wp
+      stream = new_random(1_ip)
+      do k = 1, n_sample
+         call self%draw_shape(stream, candidate)
+         grain%corners = candidate%corners
+         grain%piece = candidate%piece
+         mean = mean + self%density*area_of_grain(grain)/real(n_sample, wp)
+      end do
+   end function mean_mass
+
    !> Draw the next bodies with places that have them within the rectangle. The random numbers of shapes stay as they
    !> are.
    subroutine draw_candidates(self, n, candidates)
@@ -159,32 +184,51 @@ contains
    end subroutine draw_candidates
 
    !> Number of bodies that should enter
-   pure integer(lp) function wanted(self, n_free, elapsed)
+   pure integer(lp) function wanted(self, n_free, step, first, dt)
       class(source_t), intent(in) :: self
       !> Number of free bodies of the run
       integer(lp), intent(in) :: n_free
-      !> Time since bodies may enter [s]
-      real(wp), intent(in) :: elapsed
+      !> Number of completed steps, and that at which the stage of the source began
+      integer(lp), intent(in) :: step, first
+      !> Time step [s]
+      real(wp), intent(in) :: dt
 
       if (self%settings%count > 0_ip) then
          wanted = int(self%settings%count, lp) - n_free
       else
-         wanted = int(min(self%settings%rate*elapsed, 1.0e15_wp), lp) - self%entered
+         wanted = self%due(step, first, dt) - self%entered
       end if
       wanted = max(0_lp, min(wanted, most_at_once))
    end function wanted
 
-   !> Serialize what changes.
-   subroutine serialize(self, serializer)
-      class(source_t), intent(inout) :: self
-      class(serializer_t), intent(inout) :: serializer
-      integer(lp) :: counts(2), shapes(6), places(6)
+   !> Number of bodies that should have entered by the rate. A rate that was changed holds from then on.
+   pure integer(lp) function due(self, step, first, dt)
+      class(source_t), intent(in) :: self
+      !> Number of completed steps, and that at which the stage of the source began
+      integer(lp), intent(in) :: step, first
+      !> Time step [s]
+      real(wp), intent(in) :: dt
 
-      counts = [self%entered, self%blocked]
+      due = self%before + int(min(self%settings%rate*(real(step - max(first, self%since), wp)*dt), 1.0e15_wp), lp)
+   end function due
+
+   !> Serialize what changes.
+   subroutine serialize(self, step, serializer)
+      class(source_t), intent(inout) :: self
+      !> Number of completed steps
+      integer(lp), intent(in) :: step
+      class(serializer_t), intent(inout) :: serializer
+      real(wp) :: rate
+      integer(lp) :: counts(4), shapes(6), places(6)
+
+      counts = [self%entered, self%blocked, self%since, self%before]
+      rate = self%settings%rate
       shapes = self%shapes%state()
       places = self%places%state()
       associate (name => '/run/source_'//self%settings%name)
-         call serializer%field(name//'_counts', counts, '1', 'bodies that have entered, times without room')
+         call serializer%field(name//'_counts', counts, '1', 'bodies that have entered, times without room, '// &
+                               'step since which they enter at this rate, bodies that had entered then')
+         call serializer%field(name//'_rate', rate, '1/s', 'rate at which bodies enter')
          call serializer%field(name//'_mass', self%mass, 'kg/m', 'mass that has entered')
          call serializer%field(name//'_shapes', shapes, '1', 'state of the random numbers of shapes')
          call serializer%field(name//'_places', places, '1', 'state of the random numbers of places')
@@ -192,6 +236,12 @@ contains
       if (.not. serializer%is_reading .or. allocated(serializer%error)) return
       self%entered = counts(1)
       self%blocked = counts(2)
+      self%since = counts(3)
+      self%before = counts(4)
+      if (abs(rate - self%settings%rate) > 0.0_wp) then
+         self%since = step
+         self%before = self%entered
+      end if
       call self%shapes%set_state(shapes)
       call self%places%set_state(places)
    end subroutine serialize

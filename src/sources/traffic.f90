@@ -14,8 +14,8 @@ module polydem_traffic
    private
    public :: traffic_t, sink_t, departure_t, set_departure, is_due, number_of_values
 
-   !> Number of values of a body that leaves: mass, velocity and place
-   integer, parameter :: number_of_values = 5
+   !> Number of values of a body that leaves: mass, velocity, place and number of the material
+   integer, parameter :: number_of_values = 6
 
    !> More than the balance has totals
    integer(lp), parameter :: most_totals = 1000_lp
@@ -36,7 +36,7 @@ module polydem_traffic
    type :: departure_t
       !> Identifiers, ascending, and numbers of their sinks
       integer(lp), allocatable :: id(:), sink(:)
-      !> Mass [kg/m], velocity [m/s] and place [m] of each, (number_of_values, body)
+      !> Mass [kg/m], velocity [m/s], place [m] and number of the material of each, (number_of_values, body)
       real(dp), allocatable :: value(:, :)
    end type departure_t
 
@@ -125,11 +125,12 @@ contains
       type(named_values_t), intent(inout) :: row
       !> Number of the sink, and identifier of the body
       integer(lp), intent(in) :: sink, id
-      !> Mass, velocity and place
+      !> Mass, velocity, place and material
       real(wp), intent(in) :: value(number_of_values)
 
       call row%set('sink', real(sink, wp), '1', 'number of the sink among the groups &sink, from 1')
       call row%set('id', real(id, wp), '1', 'identifier of the body')
+      call row%set('material', value(6), '1', 'its material: position among the groups &material, 0: none of them')
       call row%set('mass', value(1), 'kg/m', 'its mass')
       call row%set('velocity_x', value(2), 'm/s', 'its velocity along x when it left')
       call row%set('velocity_y', value(3), 'm/s', 'its velocity along y')
@@ -159,8 +160,10 @@ contains
    end subroutine set_columns
 
    !> Serialize what changes.
-   subroutine serialize(self, serializer)
+   subroutine serialize(self, step, serializer)
       class(traffic_t), intent(inout) :: self
+      !> Number of completed steps
+      integer(lp), intent(in) :: step
       class(serializer_t), intent(inout) :: serializer
       integer(lp) :: n
       integer :: k
@@ -178,7 +181,7 @@ contains
       if (n > 0_lp) call serializer%field('/run/leaving_totals', self%leaving, '1', &
                                           'totals of the balance of these bodies')
       do k = 1, size(self%sources)
-         call self%sources(k)%serialize(serializer)
+         call self%sources(k)%serialize(step, serializer)
       end do
       do k = 1, size(self%sinks)
          associate (sink => self%sinks(k))

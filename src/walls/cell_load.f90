@@ -28,16 +28,16 @@ module polydem_cell_load
 contains
 
    !> Set mass, damping and unit of a cell that yields.
-   pure subroutine set_cell_mass(mass, stiffness, diameter, load)
-      !> Mass of all free bodies of the run, for a cell without a mass of its own [kg/m]
-      real(wp), intent(in) :: mass
+   pure subroutine set_cell_mass(usual, stiffness, diameter, load)
+      !> Mass of a cell without a mass of its own [kg/m]
+      real(wp), intent(in) :: usual
       !> Stiffness E of the contacts [N/m2]
       real(wp), intent(in) :: stiffness
       !> Greatest diameter of a body [m]
       real(wp), intent(in) :: diameter
       type(cell_load_t), intent(inout) :: load
 
-      if (.not. load%mass > 0.0_wp) load%mass = mass
+      if (.not. load%mass > 0.0_wp) load%mass = usual
       load%damping = load%damping_ratio*2.0_wp*sqrt(stiffness*load%mass)
       load%unit = scale(1.0_wp, exponent(stiffness*diameter*diameter) - unit_bits)
    end subroutine set_cell_mass

@@ -73,14 +73,14 @@ module polydem_wall_load
 contains
 
    !> Set masses and dampings that follow from the free bodies and the stiffness.
-   pure subroutine set_masses(loads, walls, bodies, total, stiffness)
+   pure subroutine set_masses(loads, walls, bodies, usual, stiffness)
       !> All loads
       type(wall_load_t), intent(inout) :: loads(:)
       type(named_walls_t), intent(in) :: walls
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
-      !> Mass of all free bodies of the run [kg/m]
-      real(wp), intent(in) :: total
+      !> Mass of a wall without a mass of its own [kg/m]
+      real(wp), intent(in) :: usual
       !> Stiffness E of the contacts [N/m2]
       real(wp), intent(in) :: stiffness
       real(wp) :: arm_square
@@ -90,7 +90,7 @@ contains
          associate (load => loads(k))
             arm_square = 1.0_wp
             if (load%direction == along_angle) arm_square = walls%greatest_arm(load%wall, load%pivot, bodies)**2
-            if (.not. load%mass > 0.0_wp) load%mass = total
+            if (.not. load%mass > 0.0_wp) load%mass = usual
             load%damping = load%damping_ratio*2.0_wp*sqrt(stiffness*load%mass)*arm_square
             load%mass = load%mass*arm_square
          end associate

@@ -77,7 +77,8 @@ PARTS = (f"grains.{NAME}.", f"wall.{NAME}.")
 #: Entries of sources and sinks
 TRAFFIC = tuple(f"{group}.{NAME}.{key}" for group, keys in {
     "source": "low high rate count interval stage velocity corners short_axis long_axis diameter width height arm "
-              "outline outline_corners outline_pieces outlines elongation size_spread grading angle size_ratio material density seed",
+              "outline outline_corners outline_pieces outlines elongation size_spread grading angle size_ratio "
+              "material density seed",
     "sink": "low high interval stage"}.items() for key in keys.split())
 YIELDING = tuple(f"cell.{key}" for key in "stress stress_ramp mass damping_ratio stage".split())
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
@@ -109,7 +110,8 @@ VARIED = {
     "grains.one.short_axis": "7e-3", "grains.one.long_axis": "9e-3, 12e-3", "grains.one.diameter": "8e-3, 9e-3",
     "grains.one.width": "6e-3", "grains.one.height": "4e-3", "grains.one.arm": "2e-3",
     "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
-    "grains.one.outline_corners": "3, 4", "grains.one.outline_pieces": "1, 1, 2", "grains.one.outlines": None, "grains.one.elongation": "2",
+    "grains.one.outline_corners": "3, 4", "grains.one.outline_pieces": "1, 1, 2", "grains.one.outlines": None,
+    "grains.one.elongation": "2",
     "grains.one.lloyd_steps": "3", "grains.one.gap": "2e-4",
     "grains.one.size_spread": "1.3", "grains.one.grading": "1, 0, 1.5, 0.4, 2, 1",
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",

@@ -1,6 +1,8 @@
 """Results of runs in which bodies enter and leave: frames, departures, masses, pictures, exports, a start from them."""
 
 import os
+import re
+import shutil
 import subprocess
 from fractions import Fraction
 
@@ -146,6 +148,32 @@ def test_a_run_that_is_continued_has_each_departure_once(result, tmp_path):
     assert one.state_hash == other.state_hash
     for name, values in one.departures.items():
         assert np.array_equal(values, other.departures[name]), name
+
+
+def test_a_changed_rate_holds_from_then_on(tmp_path):
+    """Finds a source that makes up for the time before, or stops until the new rate has caught up."""
+    text = (SCENE.format(folder=tmp_path / "result").replace("count = 40", "rate = 100")
+            .replace("duration = 0.3", "duration = 0.4"))
+    (tmp_path / "scene.nml").write_text(text, encoding="utf-8")
+    told = run(tmp_path / "scene.nml", "--set", "integrate.duration=0.2")
+    assert re.search(r"^source     feed: bodies of (\S+) kg/m on average, 1.00E\+02 per second", told, re.MULTILINE)
+    assert "have entered from &source" not in told
+    for rate, most in ((40, 28), (200, 60)):
+        shutil.copytree(tmp_path / "result", tmp_path / f"at_{rate}")
+        told = run(tmp_path / "scene.nml", "--continue", "--changed", "--set", f"source.feed.rate={rate}",
+                   "--set", f"output.folder={tmp_path / f'at_{rate}'}")
+        entered = Trajectory(tmp_path / f"at_{rate}").time_series["feed.entered"]
+        assert entered[-1] - 20 == pytest.approx(rate * 0.2, abs=2) and entered[-1] <= most + 1
+
+
+def test_a_source_without_room_is_told_at_the_end(tmp_path):
+    text = SCENE.format(folder=tmp_path / "result").replace("count = 40", "rate = 1e5").replace("= 0.3", "= 0.02")
+    (tmp_path / "scene.nml").write_text(text, encoding="utf-8")
+    told = run(tmp_path / "scene.nml")
+    assert re.search(r"warning: \d+ bodies have entered from &source feed, of 2000 that its rate asks for: they found "
+                     r"no room \d+ times", told)
+    told = run(tmp_path / "scene.nml", "--force", "--set", "source.feed.interval=5000")
+    assert "warning: 0 bodies have entered from &source feed, of 2000 that its rate asks for. They enter every 5000" in told
 
 
 def test_an_incomplete_frame_is_left_out(result, tmp_path):

@@ -153,7 +153,8 @@ def a_sheared_cell_goes_on_where_it_was(case):
     cell = "&cell periodic = 'xy' size = 0.125, 0.125 {shear} /\n"
     rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT
     short, sheared = rest.format(duration="duration = 7.8125e-3", scheme=""), cell.format(shear="shear_rate = 96")
-    begin, start = sheared + GAS.replace("high = 0.1, 0.1 number = 60", "high = 0.125, 0.125 number = 110"), "&scene name = 'result' start_from = '{}' /\n"
+    begin = sheared + GAS.replace("high = 0.1, 0.1 number = 60", "high = 0.125, 0.125 number = 110")
+    start = "&scene name = 'result' start_from = '{}' /\n"
     whole = case.run(begin + rest.format(duration="duration = 0.015625", scheme=""), "sheared")
     case.run(begin + short, "half")
     for how in ({}, {"ranks": 3})[:2 if case.parallel else 1]:

@@ -21,7 +21,7 @@ contains
       !> First contradiction
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), parameter :: corner = 'must exceed ''low'' along x and y'
-      integer :: k
+      integer :: j, k
 
       do k = 1, size(settings%source)
          associate (source => settings%source(k), &
@@ -32,6 +32,14 @@ contains
             if (.not. source%rate > 0.0_wp .and. source%count == 0) call blame(instance, 'rate', &
                'is 0; give it, or give ''count'', for example count = 500', error)
             call check_shape(source, instance, error)
+            do j = 1, k - 1
+               associate (other => settings%source(j))
+                  if (source%count > other%count .or. source%count == 0) cycle
+                  if (source%stage /= '' .and. other%stage /= '' .and. source%stage /= other%stage) cycle
+                  call blame(instance, 'count', 'is reached by &source '//other%name//' before a body of this one '// &
+                     'enters, since both count all free bodies: give a greater count, or a rate', error)
+               end associate
+            end do
          end associate
       end do
       do k = 1, size(settings%sink)

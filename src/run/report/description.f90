@@ -31,6 +31,7 @@ contains
          call log%write_line('bodies     '//to_text(measures%free)//' free, '//to_text(measures%fixed)//' fixed, '// &
                              to_text(measures%corners)//' vertices')
          if (s%bodies%cell%is_periodic) call log%write_line('cell       '//cell_text(s))
+         if (allocated(s%traffic)) call write_sources(s, log)
          call write_measures(measures, log)
          call log%write_line('boxes      '//to_text(measures%boxes)//', including '//to_text(measures%fixed_boxes)// &
                              ' of fixed bodies')
@@ -82,12 +83,40 @@ contains
             text = text//', '//name(axis)//' '//to_text(cell%low(axis))//' to '// &
                to_text(cell%low(axis) + cell%size(axis))//' m'
          end do
-         if (allocated(cell%load)) text = text//'; obeys a stress along '//trim(simulation%settings%cell%obeys)
+         if (allocated(cell%load)) then
+            do axis = 1, 2
+               if (.not. cell%load%yields(axis)) cycle
+               text = text//'; obeys '//to_text(cell%load%stress(axis), 3)//' N/m2 along '//name(axis)
+               if (cell%load%damping > 0.0_wp) text = text//', closes at '// &
+                  to_text(cell%load%stress(axis)*cell%size(3 - axis)/cell%load%damping, 3)//' m/s'
+            end do
+            text = text//'; mass '//to_text(cell%load%mass, 3)//' kg/m'
+         end if
       end associate
       if (simulation%n_outside == 1_lp) text = text//'; 1 body outside was moved into it'
       if (simulation%n_outside > 1_lp) text = text//'; '//to_text(simulation%n_outside)// &
          ' bodies outside were moved into it'
    end function cell_text
+
+   !> Write what the sources give: the mean mass of the first bodies, and rate or number.
+   subroutine write_sources(simulation, log)
+      type(simulation_t), intent(in) :: simulation
+      type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: text
+      real(wp) :: mass
+      integer :: k
+
+      do k = 1, size(simulation%traffic%sources)
+         associate (source => simulation%traffic%sources(k), given => simulation%traffic%sources(k)%settings)
+            mass = source%mean_mass()
+            text = 'source     '//given%name//': bodies of '//to_text(mass, 3)//' kg/m on average'
+            if (given%count > 0) text = text//', up to '//to_text(given%count)//' free bodies in the run'
+            if (given%count == 0) text = text//', '//to_text(given%rate, 3)//' per second, '// &
+               to_text(given%rate*mass, 3)//' kg/(m s)'
+            call log%write_line(text)
+         end associate
+      end do
+   end subroutine write_sources
 
    !> Write sizes, masses, densities and speeds of the bodies.
    subroutine write_measures(measures, log)

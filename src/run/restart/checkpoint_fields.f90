@@ -118,7 +118,7 @@ contains
          if (.not. serializer%is_reading) call find_release(s)
          call s%walls%named%serialize_gates(serializer)
          if (.not. serializer%is_reading) call find_leaving(s)
-         if (allocated(s%traffic)) call s%traffic%serialize(serializer)
+         if (allocated(s%traffic)) call s%traffic%serialize(s%step, serializer)
          if (allocated(s%walls%loads)) call serialize_loads(s%walls%loads, serializer)
          if (allocated(s%bodies%cell%load)) call serialize_cell(s%bodies%cell, serializer)
          shift = s%bodies%cell%shift

@@ -146,7 +146,7 @@ contains
       integer(lp), allocatable :: mine(:), all_of_them(:)
       real(dp), allocatable :: values(:), all_values(:)
       integer(ip), allocatable :: counts(:), order(:)
-      integer(ip) :: k, w
+      integer(ip) :: k, material, w
 
       allocate (kept(self%bodies%n), source=.true.)
       allocate (departing%id(0), departing%sink(0), departing%value(number_of_values, 0))
@@ -158,7 +158,10 @@ contains
             if (w == 0_ip) cycle
             kept(s) = .false.
             mine = [mine, int(bodies%id(s), lp), int(w, lp)]
-            values = [values, real([bodies%mass(s), bodies%velocity(:, s), bodies%position(:, s)], dp)]
+            material = 0_ip
+            if (allocated(bodies%material)) material = bodies%material(s)
+            values = [values, real([bodies%mass(s), bodies%velocity(:, s), bodies%position(:, s), &
+                                    real(material, wp)], dp)]
          end associate
       end do
       call self%comm%gather(mine, all_of_them, counts)
@@ -208,8 +211,7 @@ contains
       type(candidate_t), allocatable :: candidates(:)
       integer(lp), allocatable :: is_blocked(:)
       real(wp), allocatable :: circles(:, :)
-      integer(lp) :: n_free
-      real(wp) :: elapsed
+      integer(lp) :: first, n_free, wanted
       integer :: k, n_entered
 
       allocate (circles(3, 0), origin(0))
@@ -217,10 +219,11 @@ contains
          associate (source => self%traffic%sources(k))
             if (.not. is_due(source%settings%interval, source%stage, self%step, self%stages%number)) cycle
             n_free = int(self%bodies%n_all - count(self%bodies%fixed, kind=ip) + list%n, lp) - n_leaving
-            elapsed = real(self%step, wp)*self%dt
-            if (source%stage > 0_ip) elapsed = real(self%step - self%stages%first(source%stage), wp)*self%dt
-            if (source%wanted(n_free, elapsed) == 0_lp) cycle
-            call source%draw_candidates(source%wanted(n_free, elapsed), candidates)
+            first = 0_lp
+            if (source%stage > 0_ip) first = self%stages%first(source%stage)
+            wanted = source%wanted(n_free, self%step, first, self%dt)
+            if (wanted == 0_lp) cycle
+            call source%draw_candidates(wanted, candidates)
             call mark_blocked(self, source, candidates, kept, is_blocked)
             call self%comm%all_reduce_max(is_blocked)
             call admit(self, source, candidates, is_blocked, circles, list, n_entered)

@@ -41,7 +41,8 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      call prepare_loads(self)
+      call prepare_loads(self, error)
+      if (allocated(error)) return
       call prepare_cell(self)
       call find_expected_speed(self)
       call stable_step_of_shapes(self%law, self%motion%integrator%stability(), self%bodies, self%expected%speed, &
@@ -93,17 +94,30 @@ contains
    !> Set the mass of a cell that yields, if there is one. Collective.
    subroutine prepare_cell(self)
       type(simulation_t), intent(inout) :: self
-      real(wp) :: total, largest(1)
+      real(wp) :: usual, largest(1)
 
       if (.not. allocated(self%bodies%cell%load)) return
+      call find_usual_mass(self, usual)
       associate (bodies => self%bodies)
-         call sum_exactly(self%comm, bodies%mass(bodies%free), total)
          largest = 0.0_wp
          if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
          call reduce_to_greatest(self%comm, largest)
-         call set_cell_mass(total, self%settings%forces%stiffness, largest(1), bodies%cell%load)
+         call set_cell_mass(usual, self%settings%forces%stiffness, largest(1), bodies%cell%load)
       end associate
    end subroutine prepare_cell
+
+   !> Find the mass of what yields unless it is given: that of a row of grains, which is light enough to follow their
+   !> stress. Collective.
+   subroutine find_usual_mass(self, usual)
+      type(simulation_t), intent(inout) :: self
+      !> Mass of all free bodies over the root of their number; 0 if there are none [kg/m]
+      real(wp), intent(out) :: usual
+
+      associate (bodies => self%bodies)
+         call sum_exactly(self%comm, bodies%mass(bodies%free), usual)
+         usual = usual/sqrt(real(max(1_ip, bodies%n_all - count(bodies%fixed, kind=ip)), wp))
+      end associate
+   end subroutine find_usual_mass
 
    !> Check that a cell that yields is not too light for the step. Its size oscillates at most with the stiffness E of
    !> its contents, times the ratio of its sides.
@@ -124,15 +138,26 @@ contains
    end subroutine check_cell_mass
 
    !> Set the masses of walls that yield, if there are any. Collective.
-   subroutine prepare_loads(self)
+   subroutine prepare_loads(self, error)
       type(simulation_t), intent(inout) :: self
-      real(wp) :: total
+      !> Names a load whose mass is not known
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: usual
+      integer :: k
 
       if (.not. allocated(self%walls%loads)) return
+      call find_usual_mass(self, usual)
+      do k = 1, size(self%settings%load)
+         associate (load => self%settings%load(k))
+            if (usual > 0.0_wp .or. load%mass > 0.0_wp) cycle
+            call raise(error, input_error, place_of(self%settings, 'load.'//load%name, 'mass')//': ''mass'' in &load '// &
+               load%name//' is needed: there are no free bodies at the start, whose mass it could have')
+            return
+         end associate
+      end do
       associate (bodies => self%bodies, walls => self%walls)
          call walls%named%find_slots(bodies)
-         call sum_exactly(self%comm, bodies%mass(bodies%free), total)
-         call set_masses(walls%loads, walls%named, bodies, total, self%settings%forces%stiffness)
+         call set_masses(walls%loads, walls%named, bodies, usual, self%settings%forces%stiffness)
       end associate
    end subroutine prepare_loads
 

@@ -1,0 +1,100 @@
+!> Warnings at the end of a run: of what the input asked for and the run did not give.
+module polydem_end_warnings
+   use polydem_kinds, only: lp, wp
+   use polydem_log, only: log_t
+   use polydem_simulation, only: simulation_t
+   use polydem_source, only: source_t
+   use polydem_strings, only: quoted, to_text
+   implicit none
+   private
+   public :: write_end_warnings
+
+   !> Share of a load above which it is told that its damping bears it, and of bodies that are due above which it is told
+   !> that they found no room
+   real(wp), parameter :: noticed = 0.1_wp
+
+contains
+
+   !> Write the warnings.
+   subroutine write_end_warnings(simulation, log)
+      !> The simulation after its last step
+      type(simulation_t), intent(in) :: simulation
+      type(log_t), intent(inout) :: log
+      integer :: k
+
+      if (allocated(simulation%bodies%cell%load)) call warn_of_cell(simulation, log)
+      if (allocated(simulation%walls%loads)) call warn_of_loads(simulation, log)
+      if (.not. allocated(simulation%traffic)) return
+      do k = 1, size(simulation%traffic%sources)
+         call warn_of_source(simulation, simulation%traffic%sources(k), log)
+      end do
+   end subroutine write_end_warnings
+
+   !> Warn of a cell whose damping bears much of the stress.
+   subroutine warn_of_cell(simulation, log)
+      type(simulation_t), intent(in) :: simulation
+      type(log_t), intent(inout) :: log
+      character(len=1), parameter :: name(2) = ['x', 'y']
+      real(wp) :: borne
+      integer :: axis
+
+      associate (cell => simulation%bodies%cell, load => simulation%bodies%cell%load)
+         do axis = 1, 2
+            if (.not. load%yields(axis)) cycle
+            borne = -load%damping*load%speed(axis)/cell%size(3 - axis)
+            if (abs(borne) <= noticed*abs(load%stress(axis))) cycle
+            call log%write_line('warning: the size of the cell along '//name(axis)//' changes at '// &
+               to_text(load%speed(axis), 3)//' m/s at the end: its damping bears '//to_text(borne, 3)//' of '// &
+               to_text(load%stress(axis), 3)//' N/m2, the contacts only the rest. Let it run longer, or reduce '// &
+               'damping_ratio and mass in &cell')
+         end do
+      end associate
+   end subroutine warn_of_cell
+
+   !> Warn of walls whose damping bears much of their load.
+   subroutine warn_of_loads(simulation, log)
+      type(simulation_t), intent(in) :: simulation
+      type(log_t), intent(inout) :: log
+      real(wp) :: borne
+      integer :: k
+
+      do k = 1, size(simulation%walls%loads)
+         associate (load => simulation%walls%loads(k))
+            borne = load%damping*load%speed
+            if (abs(borne) <= noticed*abs(load%applied)) cycle
+            call log%write_line('warning: the wall of &load '//load%name//' moves at '//to_text(load%speed, 3)// &
+               ' at the end (SI units): its damping bears '//to_text(borne, 3)//' of the load '// &
+               to_text(load%applied, 3)//', the contacts only the rest. Let it run longer, or reduce damping_ratio '// &
+               'and mass in &load')
+         end associate
+      end do
+   end subroutine warn_of_loads
+
+   !> Warn of a source from which no body, or fewer than the rate asks for, have entered.
+   subroutine warn_of_source(simulation, source, log)
+      type(simulation_t), intent(in) :: simulation
+      type(source_t), intent(in) :: source
+      type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: text
+      integer(lp) :: due, first
+
+      associate (s => simulation, given => source%settings)
+         if (source%stage > 0_lp .and. source%stage /= s%stages%number) return
+         first = 0_lp
+         if (source%stage > 0_lp) first = s%stages%first(source%stage)
+         due = 1_lp
+         if (given%count == 0) due = source%due(s%step, first, s%dt)
+         if (real(due - source%entered, wp) <= noticed*real(due, wp)) return
+         text = 'warning: '//to_text(source%entered)//' bodies have entered from &source '//given%name
+         if (given%count == 0) text = text//', of '//to_text(due)//' that its rate asks for'
+         if (source%blocked > 0_lp) then
+            text = text//': they found no room '//to_text(source%blocked)//' times. Give it a larger or freer '// &
+               'rectangle, a greater velocity, or a lower rate'
+         else
+            text = text//'. They enter every '//to_text(given%interval)//' steps: reduce interval'
+         end if
+         call log%write_line(text)
+      end associate
+   end subroutine warn_of_source
+
+end module polydem_end_warnings
