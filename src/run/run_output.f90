@@ -2,6 +2,7 @@
 module polydem_run_output
    use polydem_balance_values, only: name_terms
    use polydem_end_condition, only: condition_text, measure_condition, needs_for_stage => needs_contacts
+   use polydem_end_warnings, only: warn_of_end
    use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_monitor, only: check_step, needs_contacts
@@ -95,6 +96,10 @@ contains
          end associate
       end associate
       call run%log%write_line(text)
+      associate (s => run%simulation, number => run%simulation%stages%number)
+         if (number > 1_ip .and. s%step == s%stages%first(number)) &
+            call warn_of_end(s, number - 1_ip, s%step - s%stages%first(number - 1_ip), run%log)
+      end associate
    end subroutine write_stage
 
    !> Evaluate the energy and momentum balance of this step if output.energy_balance is on; collective.

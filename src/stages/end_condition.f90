@@ -7,7 +7,7 @@ module polydem_end_condition
    use polydem_begin_stage, only: begin_stage, find_last_steps, wall_vector
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_kinds, only: lp, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_quantities, only: count_grains, kinetic_energy, solid_fraction, stress, unbalanced_force
    use polydem_sample_area, only: find_area, sample_area_t
    use polydem_settings, only: stage_settings_t
@@ -16,7 +16,7 @@ module polydem_end_condition
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: is_check, needs_contacts, measure_condition, decide_end, pass_end, condition_text, is_at_limit
+   public :: is_check, needs_contacts, measure_condition, decide_end, pass_end, condition_text, is_at_limit, ended_at_once
 
 contains
 
@@ -172,6 +172,20 @@ contains
       end associate
       if (begins) call begin_stage(simulation)
    end subroutine pass_end
+
+   !> Whether a condition has ended a stage as soon as it could: it held from the start
+   pure logical function ended_at_once(simulation, number, steps)
+      type(simulation_t), intent(in) :: simulation
+      !> Number of the stage
+      integer(ip), intent(in) :: number
+      !> Number of its steps
+      integer(lp), intent(in) :: steps
+
+      associate (stage => simulation%settings%stage(number))
+         ended_at_once = stage%until /= 'duration' .and. &
+                         real(steps - 1_lp, wp) <= real(stage%check, wp) + anint(stage%hold/simulation%dt) + 1.0_wp
+      end associate
+   end function ended_at_once
 
    !> Whether the present stage has lasted as long as it may, and the run must stop
    pure logical function is_at_limit(simulation)

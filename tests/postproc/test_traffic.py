@@ -173,7 +173,8 @@ def test_a_source_without_room_is_told_at_the_end(tmp_path):
     assert re.search(r"warning: \d+ bodies have entered from &source feed, of 2000 that its rate asks for: they found "
                      r"no room \d+ times", told)
     told = run(tmp_path / "scene.nml", "--force", "--set", "source.feed.interval=5000")
-    assert "warning: 0 bodies have entered from &source feed, of 2000 that its rate asks for. They enter every 5000" in told
+    assert ("warning: 0 bodies have entered from &source feed, of 2000 that its rate asks for. They enter every 5000 "
+            "steps") in told
 
 
 def test_an_incomplete_frame_is_left_out(result, tmp_path):

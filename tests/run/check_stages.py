@@ -148,6 +148,15 @@ def a_cell_that_obeyed_a_stress_keeps_its_size(case):
         assert deepest is None or float(deepest.group(1)) < 0.05, output
 
 
+def a_stage_that_ends_at_once_is_told(case):
+    text = whole(["&stage name = 'early' until = 'kinetic' below = 1e9 longest = 1 {} /\n", STAGES[1]])
+    for more, steps in (("", 101), ("hold = 3.0517578125e-3", 201), ("check = 7", 8)):
+        output = case.run(text.format(more), "early", "--force")
+        assert starts_of(output)[1] == ("press", str(steps)), output
+        assert "warning: stage early ended at its first check" in output, output
+    assert "stage fall ended at its first check" not in case.run(whole([CONDITIONS]), "late")
+
+
 def a_sheared_cell_goes_on_where_it_was(case):
     """Finds a start whose copies above are not where those of the result were. All times and shifts are exact."""
     cell = "&cell periodic = 'xy' size = 0.125, 0.125 {shear} /\n"
@@ -286,6 +295,7 @@ def faults_are_named(case):
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
          a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was, pieces_keep_their_history,
+         a_stage_that_ends_at_once_is_told,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
 

@@ -1,13 +1,14 @@
 !> Warnings at the end of a run: of what the input asked for and the run did not give.
 module polydem_end_warnings
-   use polydem_kinds, only: lp, wp
+   use polydem_end_condition, only: ended_at_once
+   use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
    use polydem_source, only: source_t
-   use polydem_strings, only: quoted, to_text
+   use polydem_strings, only: to_text
    implicit none
    private
-   public :: write_end_warnings
+   public :: write_end_warnings, warn_of_end
 
    !> Share of a load above which it is told that its damping bears it, and of bodies that are due above which it is told
    !> that they found no room
@@ -22,6 +23,10 @@ contains
       type(log_t), intent(inout) :: log
       integer :: k
 
+      associate (stages => simulation%stages)
+         if (stages%number > 0_ip) call warn_of_end(simulation, stages%number, &
+                                                    simulation%step - stages%first(stages%number), log)
+      end associate
       if (allocated(simulation%bodies%cell%load)) call warn_of_cell(simulation, log)
       if (allocated(simulation%walls%loads)) call warn_of_loads(simulation, log)
       if (.not. allocated(simulation%traffic)) return
@@ -29,6 +34,22 @@ contains
          call warn_of_source(simulation, simulation%traffic%sources(k), log)
       end do
    end subroutine write_end_warnings
+
+   !> Warn of a stage whose condition held from the start.
+   subroutine warn_of_end(simulation, number, steps, log)
+      !> The simulation at the end of the stage, or later
+      type(simulation_t), intent(in) :: simulation
+      !> Number of the stage
+      integer(ip), intent(in) :: number
+      !> Number of its steps
+      integer(lp), intent(in) :: steps
+      type(log_t), intent(inout) :: log
+
+      if (.not. ended_at_once(simulation, number, steps)) return
+      call log%write_line('warning: stage '//simulation%settings%stage(number)%name//' ended at its first check, '// &
+         'after '//to_text(real(steps, wp)*simulation%dt, 3)//' s: its condition held from the start. Grains at rest '// &
+         'before they fall have no energy, for example: give hold, the time for which it must hold, or another limit')
+   end subroutine warn_of_end
 
    !> Warn of a cell whose damping bears much of the stress.
    subroutine warn_of_cell(simulation, log)
@@ -79,9 +100,9 @@ contains
       integer(lp) :: due, first
 
       associate (s => simulation, given => source%settings)
-         if (source%stage > 0_lp .and. source%stage /= s%stages%number) return
+         if (source%stage > 0_ip .and. source%stage /= s%stages%number) return
          first = 0_lp
-         if (source%stage > 0_lp) first = s%stages%first(source%stage)
+         if (source%stage > 0_ip) first = s%stages%first(source%stage)
          due = 1_lp
          if (given%count == 0) due = source%due(s%step, first, s%dt)
          if (real(due - source%entered, wp) <= noticed*real(due, wp)) return

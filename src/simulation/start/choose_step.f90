@@ -41,9 +41,8 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      call prepare_loads(self, error)
+      call set_masses_of_yielding(self, error)
       if (allocated(error)) return
-      call prepare_cell(self)
       call find_expected_speed(self)
       call stable_step_of_shapes(self%law, self%motion%integrator%stability(), self%bodies, self%expected%speed, &
                                  stable, critical, depth, length, damped, mobility_of_walls(self))
@@ -91,20 +90,24 @@ contains
       call check_cell_mass(self, error)
    end subroutine choose_step
 
-   !> Set the mass of a cell that yields, if there is one. Collective.
-   subroutine prepare_cell(self)
+   !> Set the masses of walls and of a cell that yield, if there are any. Collective.
+   subroutine set_masses_of_yielding(self, error)
       type(simulation_t), intent(inout) :: self
+      !> Names a load whose mass is not known
+      type(error_t), allocatable, intent(inout) :: error
       real(wp) :: usual, largest(1)
 
-      if (.not. allocated(self%bodies%cell%load)) return
+      if (.not. (allocated(self%walls%loads) .or. allocated(self%bodies%cell%load))) return
       call find_usual_mass(self, usual)
+      if (allocated(self%walls%loads)) call prepare_loads(self, usual, error)
+      if (allocated(error) .or. .not. allocated(self%bodies%cell%load)) return
       associate (bodies => self%bodies)
          largest = 0.0_wp
          if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
          call reduce_to_greatest(self%comm, largest)
          call set_cell_mass(usual, self%settings%forces%stiffness, largest(1), bodies%cell%load)
       end associate
-   end subroutine prepare_cell
+   end subroutine set_masses_of_yielding
 
    !> Find the mass of what yields unless it is given: that of a row of grains, which is light enough to follow their
    !> stress. Collective.
@@ -137,16 +140,15 @@ contains
       end associate
    end subroutine check_cell_mass
 
-   !> Set the masses of walls that yield, if there are any. Collective.
-   subroutine prepare_loads(self, error)
+   !> Set the masses of walls that yield.
+   subroutine prepare_loads(self, usual, error)
       type(simulation_t), intent(inout) :: self
+      !> Mass of a wall without a mass of its own; 0: there is none [kg/m]
+      real(wp), intent(in) :: usual
       !> Names a load whose mass is not known
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: usual
       integer :: k
 
-      if (.not. allocated(self%walls%loads)) return
-      call find_usual_mass(self, usual)
       do k = 1, size(self%settings%load)
          associate (load => self%settings%load(k))
             if (usual > 0.0_wp .or. load%mass > 0.0_wp) cycle
