@@ -10,8 +10,8 @@ module polydem_end_warnings
    private
    public :: write_end_warnings, warn_of_end
 
-   !> Share of a load above which it is told that its damping bears it, and of bodies that are due above which it is told
-   !> that they found no room
+   !> Share of a load above which it is told that damping bears it, and share of the bodies that are due above which it
+   !> is told that they found no room
    real(wp), parameter :: noticed = 0.1_wp
 
 contains
