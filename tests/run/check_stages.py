@@ -148,6 +148,24 @@ def a_cell_that_obeyed_a_stress_keeps_its_size(case):
         assert deepest is None or float(deepest.group(1)) < 0.05, output
 
 
+def walls_do_not_jump_when_motions_change(case):
+    """Finds a scene that counts as another one since a wall has another speed, and walls that go on from elsewhere."""
+    for kind in ("conveyor", "translation"):
+        motion = f"&motion name = 'run' wall = 'floor' kind = '{kind}' velocity = 0, -0.1 {{}} /\n"
+        rest = motion + OUTPUT.format(duration="duration = {}", scheme="")
+        scene = SCENE.format(seed=1)
+        case.run(scene + rest.format("", "7.8125e-3"), kind)
+        shutil.copytree(kind, f"{kind}_on")
+        faster = rest.format("", "0.015625").replace("-0.1", "-0.3")
+        if kind == "conveyor":
+            case.run(scene + faster, kind, "--continue", "--changed")
+            continue
+        message = case.run(scene + faster, kind, "--continue", "--changed", code=BAD_INPUT)
+        assert "would move body 61, of a wall, at once by 1.56E-03 m" in message, message
+        more = "&motion name = 'on' wall = 'floor' kind = 'translation' velocity = 0, -0.3 start = 7.8125e-3 /\n"
+        case.run(scene + more + rest.format("end = 7.8125e-3", "0.015625"), f"{kind}_on", "--continue", "--changed")
+
+
 def a_stage_that_ends_at_once_is_told(case):
     text = whole(["&stage name = 'early' until = 'kinetic' below = 1e9 longest = 1 {} /\n", STAGES[1]])
     for more, steps in (("", 101), ("hold = 3.0517578125e-3", 201), ("check = 7", 8)):
@@ -295,7 +313,7 @@ def faults_are_named(case):
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
          a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was, pieces_keep_their_history,
-         a_stage_that_ends_at_once_is_told,
+         a_stage_that_ends_at_once_is_told, walls_do_not_jump_when_motions_change,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
 

@@ -18,6 +18,17 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> The hash, equal on all ranks
       integer(lp), intent(out) :: hash
+
+      call hash_states(comm, bodies, .false., hash)
+   end subroutine hash_all_bodies
+
+   !> Compute the hash of the states of all bodies, with or without the velocities of fixed ones.
+   subroutine hash_states(comm, bodies, walls_rest, hash)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Whether fixed bodies are taken to be at rest
+      logical, intent(in) :: walls_rest
+      integer(lp), intent(out) :: hash
       type(row_distribution_t) :: blocks
       integer(lp), allocatable :: words(:, :), block(:, :)
       integer(ip) :: k
@@ -25,6 +36,7 @@ contains
       allocate (words(7, bodies%n))
       do k = 1_ip, bodies%n
          words(:, k) = state_words(bodies, k)
+         if (walls_rest .and. bodies%fixed(k)) words(5:7, k) = 0_lp
       end do
       call order_bodies(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
@@ -33,10 +45,11 @@ contains
       if (.not. allocated(bodies%image)) return
       call blocks%to_blocks(comm, reshape([(image_word(bodies, k), k=1_ip, bodies%n)], [1_ip, bodies%n]), block)
       call mix_blocks(comm, block, hash)
-   end subroutine hash_all_bodies
+   end subroutine hash_states
 
    !> Compute the hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia,
-   !> shape, material), and their periodic cell. Collective.
+   !> shape, material), and their periodic cell. Velocities of walls do not count: motions of a run may change while it
+   !> goes on. Collective.
    subroutine hash_scene(comm, bodies, hash)
       class(communicator_t), intent(inout) :: comm
       !> Bodies of this rank at time 0
@@ -48,7 +61,7 @@ contains
       integer(ip), allocatable :: counts(:)
       integer(ip) :: k
 
-      call hash_all_bodies(comm, bodies, hash)
+      call hash_states(comm, bodies, .true., hash)
       allocate (words(4, bodies%n))
       words(1, :) = merge(1_lp, 0_lp, bodies%fixed)
       do k = 1_ip, bodies%n

@@ -18,6 +18,7 @@ module polydem_restart
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: quoted, to_text
    use polydem_timers, only: timers_t
+   use polydem_wall_places, only: check_places
    implicit none
    private
    public :: restart_state_t, find_restart, restore, remove_surplus_files, serialize_earlier
@@ -41,6 +42,8 @@ module polydem_restart
       integer(lp), private :: unlisted(3) = 0_lp
       !> Number of closed segments when the checkpoint was written
       integer(lp), private :: segments_at_checkpoint = 0_lp
+      !> Whether entries differ from those of the checkpoint by more than a longer run
+      logical, private :: is_changed = .false.
       !> Commit of the program that wrote the checkpoint, and its resolved settings
       character(len=:), allocatable, private :: revision, former_settings
    end type restart_state_t
@@ -95,6 +98,7 @@ contains
                        ': increase duration in &integrate')
          end if
          if (allocated(error)) return
+         earlier%is_changed = changes /= '' .and. .not. is_longer
          if (changes /= '') earlier%remark = earlier%remark//new_line('a')// &
             trim(merge('extended  ', 'changed   ', is_longer))//repeat(' ', merge(3, 4, is_longer))//changes
          if (is_longer .and. .not. settings%integrate%dt > 0.0_wp) earlier%remark = earlier%remark//new_line('a')// &
@@ -368,6 +372,8 @@ contains
             '. Set dt in &integrate to the saved value, or omit it'
          return
       end if
+      if (earlier%is_changed) call check_places(simulation, error)
+      if (allocated(error)) return
       ! The first step distributes the bodies again. The sums over all ranks continue on the root rank.
       associate (s => simulation, median_diameter => simulation%domain%median_diameter)
          call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, s%bodies%cell)
