@@ -237,6 +237,8 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
         choices.append([value.strip() for value in values.split(";" if ";" in values else ",") if value.strip()])
         if not choices[-1]:
             problems.append(f"{text}: a value is missing, as in scene.seed=1,2,3")
+        problems += [f"{text}: the value {value} is given twice" for value in dict.fromkeys(choices[-1])
+                     if choices[-1].count(value) > 1]
     raise_all(problems)
     product = []
     for row in rows or [Row("", (), " ".join(lists))]:
