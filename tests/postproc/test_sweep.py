@@ -570,6 +570,21 @@ def test_the_program_finds_the_wrong_entry(tmp_path, capsys):
     assert "did you mean 'friction_coefficient'" in message
 
 
+def test_tables_of_motions_go_with_the_namelist(tmp_path):
+    """Finds runs that look for a table beside the copy of the namelist, where none is."""
+    program = Path(os.environ["POLYDEM_PROGRAM"])
+    (tmp_path / "tables").mkdir()
+    for name in ("tables/a.csv", "b.csv"):
+        (tmp_path / name).write_text("time,y\n0,0\n1,-0.001\n", encoding="utf-8")
+    base = tmp_path / "plate.nml"
+    base.write_text("&wall name = 'plate' outline = 'line' from = -0.1, 0 to = 0.1, 0 thickness = 0.01 /\n"
+                    "&grains name = 'g' region = 'box' low = -0.1, 0 high = 0.1, 0.1 number = 2 /\n"
+                    "&motion name = 'm' wall = 'plate' kind = 'table' file = 'none.csv' / ! file = 'b.csv'\n"
+                    "&integrate duration = 1e-3 /\n", encoding="utf-8")
+    made = make_sweep(base, tmp_path / "sweep", program, None, ["motion.m.file=tables/a.csv,b.csv"])
+    assert Runner(program, 2, 1, say=lambda _: None).run(made.runs) == 0
+
+
 def test_knows_the_cores_of_this_process():
     only = str(available_cores()[0])
     code = "from polydem_post.sweep.runner import available_cores; print(available_cores())"
