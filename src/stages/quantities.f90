@@ -14,6 +14,7 @@ module polydem_quantities
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_sample_area, only: sample_area_t
+   use polydem_sort, only: ascending_order
    implicit none
    private
    public :: kinetic_energy, unbalanced_force, coordination, count_grains, solid_fraction, stress, flow, &
@@ -77,25 +78,51 @@ contains
       if (total(3) > 0.0_wp) unbalanced = ratio(total(1), total(2))/ratio(total(3), total(4))
    end subroutine unbalanced_force
 
-   !> Find the coordination: the mean number of contacts of a free body, also with fixed bodies. Collective.
+   !> Find the coordination: the mean number of bodies that a free body touches, also of fixed ones. Contacts of several
+   !> pieces of the same two bodies count once. Collective.
    subroutine coordination(bodies, contacts, comm, number)
       type(bodies_t), intent(in) :: bodies
       !> Table of the contacts of this step
       type(contacts_t), intent(in) :: contacts
       class(communicator_t), intent(inout) :: comm
-      !> Mean number of contacts
+      !> Mean number of bodies
       real(wp), intent(out) :: number
+      logical, allocatable :: is_another(:)
       integer(lp) :: counts(2)
       integer(ip) :: c
 
       counts = [0_lp, size(bodies%free, kind=lp)]
+      if (bodies%pieces%most > 1_ip) call find_pairs(contacts, is_another)
       do c = 1_ip, contacts%n
+         if (allocated(is_another)) then
+            if (.not. is_another(c)) cycle
+         end if
          counts(1) = counts(1) + merge(1_lp, 0_lp, is_mine(bodies, contacts%first(c))) &
                      + merge(1_lp, 0_lp, is_mine(bodies, contacts%second(c)))
       end do
       call comm%all_reduce_sum(counts)
       number = ratio(real(counts(1), wp), real(counts(2), wp))
    end subroutine coordination
+
+   !> Find out which contacts are the first ones of their two bodies in the table.
+   pure subroutine find_pairs(contacts, is_another)
+      type(contacts_t), intent(in) :: contacts
+      !> Whether no contact before has the same two bodies, (contact)
+      logical, allocatable, intent(out) :: is_another(:)
+      integer(lp), allocatable :: pairs(:)
+      integer(ip), allocatable :: order(:)
+      integer(ip) :: k
+
+      allocate (is_another(contacts%n), source=.true.)
+      allocate (pairs(contacts%n), order(contacts%n))
+      do k = 1_ip, contacts%n
+         pairs(k) = ishft(int(contacts%first(k), lp), 32) + int(contacts%second(k), lp)
+      end do
+      order(:) = ascending_order(pairs)
+      do k = 2_ip, contacts%n
+         is_another(order(k)) = pairs(order(k)) /= pairs(order(k - 1_ip))
+      end do
+   end subroutine find_pairs
 
    !> Count the free bodies whose centres are in a rectangle. Collective.
    subroutine count_grains(bodies, comm, low, high, number)

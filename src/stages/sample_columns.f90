@@ -29,7 +29,7 @@ contains
       call row%set('unbalanced_force', defined(value), '1', &
                    'mean total force on a free body over the mean force of a contact')
       call coordination(simulation%bodies, simulation%contacts, simulation%comm, value)
-      call row%set('coordination', value, '1', 'mean number of contacts of a free body')
+      call row%set('coordination', value, '1', 'mean number of bodies that a free body touches')
       if (has_area(simulation)) call set_averages(simulation, row)
    end subroutine set_sample_columns
 

@@ -123,6 +123,16 @@ def test_coordination_counts_contacts_with_fixed_bodies_once():
     assert coordination_number(frame, with_rattlers=False) == pytest.approx((2 * 3 + 1) / 3)
 
 
+def test_coordination_counts_two_bodies_once_however_they_are_cut():
+    """Finds contacts of pieces that count as bodies, also with the bodies exchanged, and bodies that they support."""
+    frame = squares([(0, 0), (1, 0), (0, -1)], fixed=[False, False, True])
+    frame = frame.with_contacts([1, 1, 2, 1, 1], [2, 3, 1, 3, 2], np.zeros((5, 2)), np.zeros((5, 2)))
+    assert_array_equal(frame.contacts.is_first, [True, True, False, False, False])
+    assert_array_equal(frame.coordination, [2, 1, 1])
+    assert coordination_number(frame) == pytest.approx(3 / 2)
+    assert_array_equal(rattlers(frame), [True, True, False])
+
+
 def test_distribution_of_forces_is_normalised():
     angles = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     size = -np.log((np.arange(400) + 0.5) / 400)  # quantiles of an exponential distribution with mean 1
@@ -565,6 +575,16 @@ def test_flow_through_a_line():
     assert mass_beyond(frames[0], (0, 1.2), (-2, -1)) == pytest.approx(
         sum(frames[0].density[k] * area_of(clip(frames[0].vertices[k], np.array([0, 1.2]), np.array([2, 1])))
             for k in range(9)))
+
+
+def test_where_bodies_enter_or_leave_messages_name_what_to_use():
+    """Finds a refusal without a remedy, and displacements from one body to another."""
+    frames = [squares([(0, 0), (3, 0)], time=0.0), squares([(0, 1)], time=1.0)]
+    with pytest.raises(ResultError, match="use run.departures, .*time_series.* or mass_beyond of each frame"):
+        flow_rate(frames, (-1, 0.5), (1, 0.5))
+    other = dataclasses.replace(frames[1], id=np.array([7]))
+    with pytest.raises(ResultError, match="not the same ones; if some enter or leave, choose"):
+        mean_squared_displacement([frames[1], other])
 
 
 def test_mixing_of_separate_and_of_mixed_kinds():

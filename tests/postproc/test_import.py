@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import Frame, ResultError
 from polydem_post.base.convex import concave_vertices, decompose
 from polydem_post.base.polygons import area_of, join, moments
-from polydem_post.bodies_file import import_bodies, import_shapely, origin_of, write_bodies
+from polydem_post.bodies_file import import_bodies, import_shapely, origin_of, pieces_of, write_bodies
 from polydem_post.command_line.main import main
 from polydem_post.read.trajectory import Trajectory
 
@@ -199,6 +199,19 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     assert import_bodies(path, output, decomposed=True, fixed=[2]) == 2
     assert_array_equal(contents(output)["fixed"], [0, 1])
     assert_array_equal(contents(output)["piece"], [0] * 4 + [0] * 4 + [1] * 4)
+
+
+def test_the_number_of_pieces_and_the_thinnest_are_told(tmp_path, capsys):
+    """Finds thicknesses of whole bodies or of those in one piece, and pieces that count as bodies."""
+    path, output = tmp_path / "stones.wkt", tmp_path / "out.h5"
+    thin = [(0, 0), (3, 0), (3, 0.01), (0, 0.01)]
+    path.write_text(f"{wkt(SQUARE)}\n{wkt(L_SHAPE)}\n{wkt(thin)}\n")
+    assert main(["import", str(path), "-o", str(output), "--decompose", "--scale", "1e-2"]) == 0
+    assert capsys.readouterr().out.startswith(f"{output}: bodies of several pieces: 1; most pieces of a body: 2; "
+                                              "thickness of the thinnest piece: 0.00889 m,")
+    assert pieces_of(output) == (1, 2, pytest.approx(0.02 * 4 / 9))  # centre of a trapezium
+    write_bodies([SQUARE], tmp_path / "one.h5")
+    assert pieces_of(tmp_path / "one.h5") == (0, 1, np.inf)
 
 
 # A square with a vertex on an edge, turned in single precision; the like in Lambert 93 coordinates; a closing vertex

@@ -1,17 +1,20 @@
 """Pictures of frames: quantities, overlays, cells of the quadtree, layout and files."""
 
 import re
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 from matplotlib.image import imread
-from polydem_post import ResultError, Trajectory
+from polydem_post import Frame, ResultError, Trajectory
 from polydem_post.command_line.main import help_text, main
 from polydem_post.pictures.drawing import OVERLAYS, Look, settle
+from polydem_post.pictures.limits import Span
 from polydem_post.pictures.plot import plot_frames
 from polydem_post.pictures.quantities import QUANTITIES, pressure, range_of, stress
 from polydem_post.pictures.tree_cells import cell_grid, tree_cells
+from polydem_post.pictures.view_data import pack_run
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +129,61 @@ def test_frames_share_one_scale(run):
     for figure in (first, last):
         assert figure.axes[0].collections[1].get_clim() == together.colour_range
         assert figure.axes[0].get_xlim() == together.limits[:2]
+
+
+class Driven:
+    """Says which fixed bodies are driven, in place of a run."""
+
+    def __init__(self, ids):
+        self.ids = ids
+
+    def driven_of(self, frame):
+        return np.isin(frame.id, self.ids)
+
+
+def scene(grains, walls, driven):
+    """Unit squares with these lower left corners; the last `driven` walls are driven."""
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    places = [*grains, *walls]
+    fixed = [False] * len(grains) + [True] * len(walls)
+    frame = Frame.from_polygons([corners + place for place in places], fixed=fixed)
+    return replace(frame, _source=Driven(frame.id[len(places) - driven:]))
+
+
+def corners_of(start, *frames):
+    span = Span(start)
+    for frame in frames:
+        span.add(frame)
+    return span.corners().ravel().tolist()
+
+
+def test_a_driven_wall_that_goes_far_away_does_not_count():
+    """Finds a gate that makes the silo tiny, a drum or piston that is cut, and an early picture of a late one."""
+    floor, start = (9, 0), scene([(0, 0)], [(9, 0), (4, 9)], 1)
+    gone = scene([(0, 0)], [floor, (4, 900)], 1)
+    assert corners_of(start, start) == [0, 0, 10, 10]
+    assert corners_of(start, start, gone) == corners_of(start, gone) == [0, 0, 10, 11]
+    assert corners_of(start, scene([(0, 0)], [floor, (4, 2)], 1)) == [0, 0, 10, 3]
+    assert corners_of(start, start, scene([(0, 0)], [floor, (4, 9.5)], 1)) == [0, 0, 10, 10.5]
+    # All walls are driven: a cart takes its grains along.
+    cart = [scene([(x, 0)], [(x - 1, 0), (x + 1, 0)], 2) for x in (0, 50)]
+    assert corners_of(cart[0], *cart) == [-1, 0, 52, 1]
+
+
+def test_grains_that_fall_for_ever_count_as_far_below_as_the_scene_is_large():
+    """Finds a silo without a floor that gets tiny, and a run without walls that is cut."""
+    start, late = scene([(0, 5)], [(9, 0)], 0), scene([(0, -500)], [(9, 0)], 0)
+    assert corners_of(start, start, late) == [0, -10, 10, 6]
+    assert corners_of(scene([(0, 5)], [], 0), scene([(0, -500)], [], 0)) == [0, -500, 1, -499]
+
+
+def test_pictures_and_the_viewer_show_the_same_part_of_the_plane(run):
+    low, high = run[0].bounds[:, :2].min(axis=0), run[0].bounds[:, 2:].max(axis=0)
+    margin = 0.02 * max(high - low)
+    limits = settle(run, [-1], Look()).limits
+    expected = [low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin]
+    assert np.allclose(limits, expected, atol=0.2 * margin)
+    assert np.array_equal(pack_run(run, [-1]).facts["limits"], np.array(limits)[[0, 2, 1, 3]])
 
 
 def test_bodies_are_drawn_where_they_are_in_their_colour(run, tmp_path):

@@ -17,7 +17,7 @@ from polydem_post.base.result_file import ResultError
 from polydem_post.command_line.main import main
 from polydem_post.sweep import runner as sweep_run
 from polydem_post.sweep.batch import Row, Run, expand, make_sweep, read_table
-from polydem_post.sweep.collect import read_outcome
+from polydem_post.sweep.collect import read_outcome, same_states
 from polydem_post.sweep.runner import Runner, available_cores, environment, is_running, state_of
 
 #: How long something may take on a busy machine [s]
@@ -196,6 +196,11 @@ def test_a_group_with_a_name_is_named_in_a_list():
 def test_refuses_lists_that_are_none(lists):
     with pytest.raises(ResultError):
         expand([], [], lists)
+
+
+def test_refuses_a_value_that_is_given_twice():
+    with pytest.raises(ResultError, match=r"^scene.seed=2,1,2: the value 2 is given twice$"):
+        expand([], [], ["scene.seed=2,1,2"])
 
 
 # --- making ------------------------------------------------------------------------------------------------------
@@ -534,6 +539,26 @@ def test_collects_what_the_program_left(heights, capsys):
         assert str(file["exit_code"][3]) == "nan"
 
 
+def test_collect_tells_of_a_seed_without_effect(tmp_path, capsys):
+    """Finds runs that pass for independent ones, and a warning about runs that differ, or only in their finder."""
+    program = Path(os.environ["POLYDEM_PROGRAM"])
+    base = tmp_path / "own.nml"
+    base.write_text("&grains name = 'g' seed = 7 region = 'box' low = 0, 0 high = 0.1, 0.1 number = 5 speed = 1 /\n"
+                    "&integrate duration = 1e-3 dt = 1e-4 /\n", encoding="utf-8")
+    made = make_sweep(base, tmp_path / "sweep", program, None,
+                      ["scene.seed=1,2", "neighbours.finder=quadtree,all_pairs", "grains.g.number=5,6"])
+    assert Runner(program, 2, 1, say=lambda _: None).run(made.runs) == 0
+    assert main(["sweep", "collect", str(made.folder)]) == 0
+    told = [line for line in capsys.readouterr().out.splitlines() if "state hash" in line]
+    assert [line.count("seed_1") for line in told] == [2, 2] and "number_6" in told[1]
+    assert told[0].endswith(": the same state hash: scene.seed had no effect (a group with a seed of its own does not "
+                            "use it); error bars must count them as one run")
+    few = [read_outcome(run) for run in made.runs if run.values["scene.seed"] == "1"]
+    assert same_states(few) == []
+    assert same_states([few[0], few[0]])[0].endswith("hash: their entries are the same; error bars must count them as "
+                                                     "one run")
+
+
 def test_the_program_finds_the_wrong_entry(tmp_path, capsys):
     program, root = os.environ["POLYDEM_PROGRAM"], Path(os.environ["POLYDEM_SOURCE_DIR"])
     table = tmp_path / "table.csv"
@@ -543,6 +568,21 @@ def test_the_program_finds_the_wrong_entry(tmp_path, capsys):
     message = capsys.readouterr().err
     assert message.startswith(f"error: {table}:2: --set forces.fricton_coefficient=0.1")
     assert "did you mean 'friction_coefficient'" in message
+
+
+def test_tables_of_motions_go_with_the_namelist(tmp_path):
+    """Finds runs that look for a table beside the copy of the namelist, where none is."""
+    program = Path(os.environ["POLYDEM_PROGRAM"])
+    (tmp_path / "tables").mkdir()
+    for name in ("tables/a.csv", "b.csv"):
+        (tmp_path / name).write_text("time,y\n0,0\n1,-0.001\n", encoding="utf-8")
+    base = tmp_path / "plate.nml"
+    base.write_text("&wall name = 'plate' outline = 'line' from = -0.1, 0 to = 0.1, 0 thickness = 0.01 /\n"
+                    "&grains name = 'g' region = 'box' low = -0.1, 0 high = 0.1, 0.1 number = 2 /\n"
+                    "&motion name = 'm' wall = 'plate' kind = 'table' file = 'none.csv' / ! file = 'b.csv'\n"
+                    "&integrate duration = 1e-3 /\n", encoding="utf-8")
+    made = make_sweep(base, tmp_path / "sweep", program, None, ["motion.m.file=tables/a.csv,b.csv"])
+    assert Runner(program, 2, 1, say=lambda _: None).run(made.runs) == 0
 
 
 def test_knows_the_cores_of_this_process():

@@ -74,12 +74,13 @@ def test_frames_lose_the_gate(run):
     assert last.position[last.free, 1].min() < -0.001
 
 
-#: Grains in a box whose walls bound the sample, in part of it, in a channel, and in a sheared cell
+#: Grains in a box whose walls bound the sample, in part of it, in a channel, in a sheared cell; crosses in a box
 SAMPLES = {
     "walls": ("sides = 'right', 'left' ends = 'floor', 'lid'", (-0.05, -0.05, 0.05, 0.05), "none"),
     "rectangle": ("low = -0.03, -0.04 high = 0.04, 0.03", (-0.03, -0.04, 0.04, 0.03), "none"),
     "channel": ("ends = 'floor', 'lid'", (-0.05, -0.05, 0.05, 0.05), "x"),
     "none": ("", (-0.05, -0.05, 0.05, 0.05), "xy"),
+    "concave": ("low = -0.05, -0.05 high = 0.05, 0.05", (-0.05, -0.05, 0.05, 0.05), "none"),
 }
 WALLS = """\
 &wall name = 'floor' outline = 'rectangle' low = -0.07, -0.07 high = 0.07, -0.05 /
@@ -104,21 +105,24 @@ GRAINS = """\
 def test_the_sample_has_the_quantities_of_its_frames(kind, tmp_path):
     """Finds columns that mean something else than the functions of frames, and an area that is another."""
     entries, area, periodic = SAMPLES[kind]
-    word = "walls" if kind == "channel" else kind
+    word = {"channel": "walls", "concave": "rectangle"}.get(kind, kind)
     scene = {"channel": CHANNEL, "none": CELL}.get(kind, WALLS) + GRAINS
     scene += f"&sample area = '{word}' {entries} /\n&integrate duration = 0.04 /\n"
     if kind == "none":
         scene = scene.replace("0, -20", "0, 0")
+    if kind == "concave":
+        scene = scene.replace(" arrangement =", " shape = 'cross' width = 0.011 arm = 0.004 arrangement =")
     (tmp_path / "scene.nml").write_text(scene, encoding="utf-8")
     subprocess.run([PROGRAM, "run", "scene.nml"], cwd=tmp_path, check=True, capture_output=True)
     run = Trajectory(tmp_path / "results" / "scene")
     series = run.time_series
     assert len(run) == len(series["time"]) == 11
     gravity, jump = ((0.0, 0.0), 60.0) if kind == "none" else ((0.0, -20.0), None)
-    n_pressed = 0
+    n_pressed, n_several = 0, 0
     for k, frame in enumerate(run):
         stress = sample_stress(frame, area)
         n_pressed += np.trace(stress) > 0.0
+        n_several += not frame.contacts.is_first.all()
         expected = {
             "kinetic_energy": frame.kinetic_energy[frame.free].mean(),
             "unbalanced_force": unbalanced_force(frame, gravity),
@@ -131,6 +135,7 @@ def test_the_sample_has_the_quantities_of_its_frames(kind, tmp_path):
             scale = np.abs(stress).max() if name.startswith("stress") else 0.0
             np.testing.assert_allclose(series[name][k], value, rtol=1e-9, atol=1e-9 * scale, err_msg=name)
     assert n_pressed > 4
+    assert n_several > 4 if kind == "concave" else n_several == 0
 
 
 def test_lines_of_the_log_have_the_quantities_of_a_row_at_their_step(tmp_path):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import polydem_post
 import pytest
-from polydem_post import Trajectory
+from polydem_post import Frame, Trajectory
 from polydem_post.command_line.main import main
 from polydem_post.pictures import view_data
 from polydem_post.pictures.view import SCRIPTS, SOURCES
@@ -56,6 +56,24 @@ def test_positions_and_angles_are_rounded_as_stated(view, run):
         assert error <= 0.5001 * fact["quantum"]
     free = ~run[0].fixed
     assert facts["series"]["x"]["quantum"] == pytest.approx(1e-3 * np.median(run[0].equivalent_diameter[free]))
+
+
+def test_contacts_of_several_pieces_of_two_bodies_are_packed_one_by_one():
+    """Finds counts that the bits of the pairs do not have, so that forces go to other contacts."""
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    frame = Frame.from_polygons([square, square + np.array([1, 0]), square + np.array([0, -1])])
+    table = view_data._Contacts()
+    table.add(frame.with_contacts([1, 1, 1], [2, 3, 2], [(0, 4), (0, 1), (0, 9)], np.zeros((3, 2))))
+    table.add(frame.with_contacts([1], [2], [(0, 1)], np.zeros((1, 2))))
+    packed = view_data.Packed()
+    table.pack(packed, 1.0)
+    read = {name: np.frombuffer(zlib.decompress(base64.b64decode(data)), np.uint8)
+            for name, data in packed.blocks.items()}
+    assert packed.facts["contacts"]["count"] == [3, 1] and packed.facts["contacts"]["pairs"] == 3
+    assert read["pair_first"].view("<u4").tolist() == [0, 0, 0]
+    assert read["pair_second"].view("<u4").tolist() == [1, 1, 2]
+    assert np.bitwise_xor.accumulate(read["present"]).tolist() == [0b111, 0b001]
+    assert read["force"].tolist() == [170, 255, 85, 85]
 
 
 @pytest.mark.parametrize("arguments, message", [

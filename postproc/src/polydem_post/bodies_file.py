@@ -14,7 +14,7 @@ import numpy as np
 
 from .base.convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .base.new_file import NewHdf5, new_file
-from .base.polygons import FloatArray, IntArray, join
+from .base.polygons import FloatArray, IntArray, following, join, moments
 from .base.result_file import ResultError, cannot_read, cannot_write
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 
@@ -162,6 +162,31 @@ def origin_of(path: str | os.PathLike[str]) -> tuple[float, float]:
             return float(file.attrs.get("origin_x", 0.0)), float(file.attrs.get("origin_y", 0.0))
     except OSError as error:
         raise cannot_read(Path(path), error) from error
+
+
+def pieces_of(path: str | os.PathLike[str]) -> tuple[int, int, float]:
+    """Number of bodies of several pieces, most pieces of a body, and thickness of the thinnest piece of them [m].
+
+    The thickness is twice the smallest distance of an edge from the centroid.
+    """
+    try:
+        with h5py.File(path) as file:
+            vertex, start = file["vertex"][:], file["vertex_start"][:]
+            piece = file["piece"][:] if "piece" in file else np.zeros(len(vertex), dtype=np.int64)
+    except OSError as error:
+        raise cannot_read(Path(path), error) from error
+    count = np.maximum.reduceat(piece, start[:-1]) + 1
+    several = np.repeat(count > 1, np.diff(start))
+    if not several.any():
+        return 0, 1, float("inf")
+    body = np.repeat(np.arange(len(count)), np.diff(start))
+    begins = np.append(True, (np.diff(body) != 0) | (np.diff(piece) != 0))
+    ends = np.append(np.flatnonzero(begins[several]), several.sum())
+    corners = vertex[several]
+    _, centre, _ = moments(corners, ends)
+    edge, arm = corners[following(ends)] - corners, corners - np.repeat(centre, np.diff(ends), axis=0)
+    distance = np.abs(arm[:, 0] * edge[:, 1] - arm[:, 1] * edge[:, 0]) / np.hypot(edge[:, 0], edge[:, 1])
+    return int((count > 1).sum()), int(count.max()), 2.0 * float(distance.min())
 
 
 def _shift(outlines: list[Outline], scale: float, origin: Origin) -> FloatArray:

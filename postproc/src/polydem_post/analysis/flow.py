@@ -46,7 +46,8 @@ def flow_rate(frames: Iterable[Frame], start: Any, end: Any) -> FlowRate:
     looking from start to end, is positive. For a hopper take the line along the opening from right to left, then
     what falls is negative, or from left to right, then it is positive. The rate of discharge was first described so by
     W.A. Beverloo, H.A. Leniger & J. van de Velde, Chem. Eng. Sci. 15 (1961) 260. Frames must follow closely enough that
-    a path does not bend around the ends of the line.
+    a path does not bend around the ends of the line. All frames need the same bodies: with sources and sinks,
+    `run.departures` has each body that left, `run.time_series['NAME.mass']` what left through a sink so far.
     """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     along = b - a
@@ -57,7 +58,10 @@ def flow_rate(frames: Iterable[Frame], start: Any, end: Any) -> FlowRate:
         times.append(frame.time)
         if before is not None:
             if not np.array_equal(before.id, frame.id):
-                raise ResultError("the bodies are not the same in all frames")
+                raise ResultError(
+                    "the bodies are not the same in all frames, since some enter, leave or vanish; use run.departures, "
+                    "which has each body that left, run.time_series['NAME.mass'] of a sink, or mass_beyond of each "
+                    "frame; or choose frames between which none does, as in run[10:20]")
             depth, later = (before.position - a) @ right, (frame.position - a) @ right
             crosses = ((depth <= 0.0) != (later <= 0.0)) & frame.free
             with np.errstate(divide="ignore", invalid="ignore"):

@@ -41,13 +41,15 @@ def mean_squared_displacement(frames: Iterable[Frame], chosen: Any = None, *, re
     origins as in M.P. Allen & D.J. Tildesley, Computer Simulation of Liquids (2017), Sec. 8.5. All positions are in
     memory: 16 bytes per frame and body.
     """
-    times, steps, places = [], [], []
+    times, steps, places, names = [], [], [], []
     for frame in frames:
         times.append(frame.time)
         steps.append(frame.step)
         places.append(frame.position[frame.free if chosen is None else chosen])
-    if not places or len({place.shape for place in places}) != 1 or len(places[0]) == 0:
-        raise ResultError("the frames have no bodies to follow, or not the same ones")
+        names.append(frame.id[frame.free if chosen is None else chosen])
+    if not places or len(places[0]) == 0 or not all(np.array_equal(each, names[0]) for each in names):
+        raise ResultError("the frames have no bodies to follow, or not the same ones; if some enter or leave, choose "
+                          "frames between which none does, or bodies that are in all of them")
     interval = np.diff(times)
     time_step = (times[-1] - times[0]) / (steps[-1] - steps[0]) if steps[-1] > steps[0] else 0.0
     allowed = max(EQUAL * np.median(interval), 1.01 * time_step) if len(times) > 1 else 0.0

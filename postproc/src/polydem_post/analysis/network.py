@@ -18,11 +18,12 @@ def rattlers(frame: Frame, least: int = 2) -> npt.NDArray[np.bool_]:
 
     Bodies are removed until all that are left have `least` contacts. With friction a body needs two contacts to be
     supported without gravity, without friction three (I. Agnolin & J.-N. Roux, Phys. Rev. E 76 (2007) 061302).
+    Contacts of several pieces of the same two bodies count once.
     """
     contacts = frame.contacts
     out = np.zeros(len(frame), dtype=bool)
     while True:
-        kept = ~(out[contacts.first_index] | out[contacts.second_index])
+        kept = contacts.is_first & ~(out[contacts.first_index] | out[contacts.second_index])
         ends = np.concatenate([contacts.first_index[kept], contacts.second_index[kept]])
         few = frame.free & ~out & (np.bincount(ends, minlength=len(frame)) < least)
         if not few.any():
@@ -33,12 +34,13 @@ def rattlers(frame: Frame, least: int = 2) -> npt.NDArray[np.bool_]:
 def coordination_number(frame: Frame, *, with_rattlers: bool = True, least: int = 2) -> float:
     """Mean number of contacts of the free bodies, Z = (2 N_ff + N_fw)/N (Bernal & Mason, Nature 188 (1960) 910).
 
-    N_ff contacts of two free bodies, N_fw of a free and a fixed one, N free bodies. Two convex bodies have one contact,
-    whatever they touch with. Without rattlers these bodies and their contacts are left out. NaN if no body is left.
+    N_ff contacts of two free bodies, N_fw of a free and a fixed one, N free bodies. Two bodies have one contact,
+    whatever and with however many pieces they touch. Without rattlers these bodies and their contacts are left out.
+    NaN if no body is left.
     """
     out = np.zeros(len(frame), dtype=bool) if with_rattlers else rattlers(frame, least)
     contacts = frame.contacts
-    kept = ~(out[contacts.first_index] | out[contacts.second_index])
+    kept = contacts.is_first & ~(out[contacts.first_index] | out[contacts.second_index])
     ends = np.concatenate([contacts.first_index[kept], contacts.second_index[kept]])
     n = int((frame.free & ~out).sum())
     return float(frame.free[ends].sum()) / n if n else float("nan")

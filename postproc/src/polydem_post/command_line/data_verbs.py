@@ -88,7 +88,7 @@ def _progress(done: int, total: int) -> None:
 
 
 def _import(options: argparse.Namespace) -> None:
-    from ..bodies_file import import_bodies, origin_of
+    from ..bodies_file import import_bodies, origin_of, pieces_of
 
     if not np.isfinite(options.scale):
         raise ResultError("--scale takes a number above 0")
@@ -97,5 +97,9 @@ def _import(options: argparse.Namespace) -> None:
     if options.origin is not None:
         x, y = origin_of(options.output)
         print(f"{options.output}: its origin is at ({x!r}, {y!r}) m; export adds this to the coordinates")
+    several, most, thinnest = pieces_of(options.output)
+    if several:
+        print(f"{options.output}: bodies of several pieces: {several}; most pieces of a body: {most}; thickness of the "
+              f"thinnest piece: {thinnest:.3g} m, which makes the time step short if it is small")
     bodies, quoted = "1 body" if n == 1 else f"{n} bodies", str(options.output).replace("'", "''")
     print(f"{options.output}: {bodies}; in the namelist: &scene name = 'file', bodies_file = '{quoted}'")

@@ -17,6 +17,7 @@ from matplotlib.transforms import Affine2D
 from ..base.result_file import ResultError
 from ..read.frames import Frame
 from ..read.trajectory import Trajectory
+from .limits import Span
 from .quantities import QUANTITIES, Quantity, range_of, stress
 from .tree_cells import CellGrid, cell_grid, tree_cells
 
@@ -57,7 +58,7 @@ class Look:
     colour: str = "none"
     #: Names of OVERLAYS
     show: tuple = ()
-    #: x0, x1, y0, y1 [m]; by default all bodies of all frames that are shown
+    #: x0, x1, y0, y1 [m]; by default those of `limits.Span`
     limits: tuple | None = None
     #: Least and greatest value of the scale of colours; found from the frames if absent
     colour_range: tuple | None = None
@@ -110,23 +111,15 @@ class SettledLook(Look):
 class _Extent:
     """What all frames together span."""
 
-    def __init__(self) -> None:
-        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
-        self.periodic = np.zeros(2, dtype=bool)
+    def __init__(self, start: Frame) -> None:
+        self.span = Span(start)
         self.values: list[np.ndarray] = []
         self.forces: list[np.ndarray] = []
         self.stresses: list[np.ndarray] = []
 
     def add(self, frame: Frame, look: Look) -> None:
         """Take a frame into account."""
-        if len(frame.vertex):
-            self.low = np.minimum(self.low, frame.vertex.min(axis=0))
-            self.high = np.maximum(self.high, frame.vertex.max(axis=0))
-            # Of a periodic cell all is in the cell.
-            periodic = frame.cell_size > 0.0
-            self.low[periodic] = frame.cell_low[periodic]
-            self.high[periodic] = (frame.cell_low + frame.cell_size)[periodic]
-        self.periodic = frame.cell_size > 0.0
+        self.span.add(frame)
         free = ~frame.fixed
         if look.quantity and look.colour_range is None:
             self.values.append(look.quantity.values(frame)[free])
@@ -139,15 +132,10 @@ class _Extent:
         """The look with all that was left open."""
         limits, colour_range = look.limits, look.colour_range
         if limits is None:
-            if not np.all(np.isfinite(self.low)):
-                raise ResultError("there are no bodies to draw")
-            margin = 0.02 * max(self.high - self.low)
-            if not 0.0 < margin < np.inf:
-                raise ResultError("the bodies have no extent that can be drawn")
-            aside, above = np.where(self.periodic, 0.0, margin)
-            limits = (self.low[0] - aside, self.high[0] + aside, self.low[1] - above, self.high[1] + above)
-        elif np.any(self.high < limits[::2]) or np.any(self.low > limits[1::2]):
-            spans = (f"{axis} {low:.4g} to {high:.4g} m" for axis, low, high in zip("xy", self.low, self.high))
+            low, high = self.span.limits()
+            limits = (low[0], high[0], low[1], high[1])
+        elif np.any(self.span.everything()[1] < limits[::2]) or np.any(self.span.everything()[0] > limits[1::2]):
+            spans = (f"{axis} {low:.4g} to {high:.4g} m" for axis, low, high in zip("xy", *self.span.everything()))
             raise ResultError(f"no body is within the limits {','.join(f'{side:g}' for side in limits)}; the bodies "
                               f"are at {', '.join(spans)}")
         if colour_range is None:
@@ -173,7 +161,7 @@ def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLoo
         named = [name for name in look.show if name in NEED_CONTACTS] or [look.colour]
         raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
                           "output.contacts = .true.")
-    extent = _Extent()
+    extent = _Extent(trajectory[0])
     for frame in trajectory[numbers]:
         extent.add(frame, look)
     if "cells" in look.show:

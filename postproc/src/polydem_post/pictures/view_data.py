@@ -14,6 +14,7 @@ from ..base.result_file import ResultError, reason
 from ..read.frames import Frame
 from ..read.trajectory import Trajectory
 from .drawing import OVERLAYS
+from .limits import Span
 from .quantities import QUANTITIES, range_of
 from .tree_cells import cell_grid
 
@@ -23,6 +24,9 @@ POSITION_SHARE, ANGLE_QUANTUM, VELOCITY_SHARE = 1e-3, 2.0**-10, 1.0 / 2047.0
 
 #: Steps of the magnitude of a force (its square root is rounded), of its direction, and of the arm of a contact
 FORCE_STEPS, DIRECTION_STEPS, ARM_STEPS = 255, 256, 127
+
+#: Most contacts of two bodies of several pieces that are told apart
+MOST_CONTACTS = 2**10
 
 #: Deflate level: higher ones gain little
 LEVEL = 6
@@ -94,7 +98,10 @@ class _Contacts:
         order = np.lexsort((contacts.second_index, contacts.first_index))
         first, second = contacts.first_index[order], contacts.second_index[order]
         base = np.where(frame.fixed[first], second, first)
-        self.keys.add(first.astype(np.int64) * self.bodies + second)
+        pair = first.astype(np.int64) * self.bodies + second
+        # Two bodies of several pieces may have several contacts, each with a row of its own in the list of pairs.
+        self.keys.add(pair * MOST_CONTACTS + np.minimum(np.arange(len(pair)) - np.searchsorted(pair, pair),
+                                                        MOST_CONTACTS - 1))
         self.arms.add(contacts.point[order] - frame.position[base])
         self.forces.add(contacts.force[order])
 
@@ -125,8 +132,8 @@ class _Contacts:
             bits = np.packbits(present, bitorder="little")
             row[:] = bits ^ before
             before = bits
-        packed.add("pair_first", (pairs // self.bodies).astype(np.uint32))
-        packed.add("pair_second", (pairs % self.bodies).astype(np.uint32))
+        packed.add("pair_first", (pairs // MOST_CONTACTS // self.bodies).astype(np.uint32))
+        packed.add("pair_second", (pairs // MOST_CONTACTS % self.bodies).astype(np.uint32))
         packed.add("present", changed)
         return len(pairs)
 
@@ -180,7 +187,7 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     packed = Packed({"series": {}})
     columns = {name: _Rows(np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")}
     values = {name: _Rows(np.float32) for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
-    table, first, low, high = _Contacts(), None, np.full(2, np.inf), np.full(2, -np.inf)
+    table, first, span = _Contacts(), None, Span(trajectory[0])
     everybody = _Everybody(trajectory[numbers])
     for present in trajectory[numbers]:
         frame, absent = everybody.with_absent(present)
@@ -195,7 +202,7 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
                 if absent is not None and not QUANTITIES[name].constant:
                     found = np.where(absent, np.nan, found)
                 collected.add(found[~frame.fixed])
-        low, high = np.minimum(low, present.vertex.min(axis=0)), np.maximum(high, present.vertex.max(axis=0))
+        span.add(present)
         if contacts:
             table.add(frame)
         if progress:
@@ -206,8 +213,7 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     if contacts:
         table.pack(packed, reach)
     _describe(packed, trajectory, numbers, values)
-    margin = 0.02 * max(high - low)
-    packed.facts["limits"] = [*(low - margin), *(high + margin)]
+    packed.facts["limits"] = [float(side) for corner in span.limits() for side in corner]
     return packed
 
 

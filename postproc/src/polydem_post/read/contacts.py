@@ -62,6 +62,15 @@ class Contacts:
         return f"<Contacts: {len(self)} pairs{greatest}>"
 
     @cached_property
+    def is_first(self) -> npt.NDArray[np.bool_]:
+        """Whether no contact before has the same two bodies [1], (m): bodies of several pieces may have several."""
+        low, high = np.sort([self.first, self.second], axis=0).astype(np.int64)
+        _, rows = np.unique((low << 32) + high, return_index=True)
+        first = np.zeros(len(self), dtype=bool)
+        first[rows] = True
+        return first
+
+    @cached_property
     def length(self) -> FloatArray:
         """Length of each contact [m], (m): magnitude of `normal`."""
         return np.hypot(self.normal[:, 0], self.normal[:, 1])

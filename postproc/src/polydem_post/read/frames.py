@@ -316,10 +316,10 @@ class Frame:
 
     @cached_property
     def coordination(self) -> IntArray:
-        """Number of contacts of each body [1], (n); the run must have written contacts."""
-        n = len(self)
-        return (np.bincount(self.contacts.first_index, minlength=n)
-                + np.bincount(self.contacts.second_index, minlength=n)).astype(np.int64)
+        """Number of bodies that each body touches [1], (n); the run must have written contacts."""
+        n, once = len(self), self.contacts.is_first
+        return (np.bincount(self.contacts.first_index[once], minlength=n)
+                + np.bincount(self.contacts.second_index[once], minlength=n)).astype(np.int64)
 
     def index_of(self, identifiers: Any) -> IntArray:
         """Indices of bodies in the columns of this frame from their k identifiers [1], (k)."""

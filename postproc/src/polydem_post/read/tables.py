@@ -14,6 +14,10 @@ import numpy.typing as npt
 from ..base.columns import columns_of
 from ..base.result_file import ResultError
 
+#: Why a column of all frames cannot be one array, and what to do
+OTHER_BODIES = ("the bodies are not the same in all frames, since some enter, leave or vanish; take frame by frame and "
+                "its id, or frames between which none does, as in run[10:20]; run.departures has each body that left")
+
 #: Columns of bodies in tables: those that need no contacts and no settings
 BODY_COLUMNS = ("fixed", "position", "angle", "velocity", "angular_velocity", "mass", "inertia", "area", "density",
                 "material", "radius", "corners")
@@ -94,7 +98,7 @@ def trajectory_dataset(run: Any) -> Any:
     parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in MOVING_COLUMNS}
     for frame in run:
         if not np.array_equal(frame.id, first.id):
-            raise ResultError(f"{run.folder}: the bodies are not the same in all frames")
+            raise ResultError(f"{run.folder}: {OTHER_BODIES}")
         for name, column in parts.items():
             column.append(getattr(frame, name))
     for name in BODY_COLUMNS:

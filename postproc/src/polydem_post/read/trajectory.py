@@ -28,7 +28,7 @@ from .frames import CONTACT_FIELDS, Frame, find_contacts, sound_frame
 from .result_folder import ResultFolder
 from .segments import FrameRows, Segment
 from .settings import Settings
-from .tables import trajectory_dataset, trajectory_table
+from .tables import OTHER_BODIES, trajectory_dataset, trajectory_table
 
 #: Columns of bodies that change from frame to frame
 GROWING = ("position", "angle", "velocity", "angular_velocity")
@@ -169,7 +169,7 @@ class Trajectory:
         identifiers = None
         for frame in self:
             if identifiers is not None and not np.array_equal(identifiers, frame.id):
-                raise ResultError(f"{self.folder}: the bodies are not the same in all frames")
+                raise ResultError(f"{self.folder}: {OTHER_BODIES}")
             identifiers = frame.id
             column = np.asarray(getattr(frame, name))
             if len(column) != len(frame):

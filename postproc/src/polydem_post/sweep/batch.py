@@ -4,6 +4,7 @@ A sweep is a folder, made once and then filled by runs:
 
     table.csv                 one row per run: its name, and its value of each entry
     runs/NAME/input.nml       the namelist, as it was when the sweep was made
+    runs/NAME/...             tables of motions beside or below the namelist, whose paths are relative to it
     runs/NAME/overrides.txt   the entries of this run, one group.key=value to a line
     runs/NAME/attempts.csv    when it was run, for how long, with which exit code (see runner)
     runs/NAME/output.txt      what it printed
@@ -40,6 +41,9 @@ LISTED_ENTRY = re.compile(rf"({ENTRY.pattern})=(.*)", re.DOTALL)
 
 #: The sweep itself says where results go
 OWN_ENTRY = "output.folder"
+
+#: The table of a motion in a namelist or a list of overrides
+TABLE_OF_MOTION = re.compile(r"""\bfile\s*=\s*['"]?([^'"\s,/][^'"\n,]*)""", re.IGNORECASE)
 
 #: So many wrong rows are told
 MOST_TOLD = 100
@@ -237,6 +241,8 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
         choices.append([value.strip() for value in values.split(";" if ";" in values else ",") if value.strip()])
         if not choices[-1]:
             problems.append(f"{text}: a value is missing, as in scene.seed=1,2,3")
+        problems += [f"{text}: the value {value} is given twice" for value in dict.fromkeys(choices[-1])
+                     if choices[-1].count(value) > 1]
     raise_all(problems)
     product = []
     for row in rows or [Row("", (), " ".join(lists))]:
@@ -286,6 +292,7 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
             place.mkdir(parents=True)
             shutil.copyfile(base, place / INPUT)
             (place / OVERRIDES).write_text("".join(f"{entry}\n" for entry in entries), encoding="utf-8")
+            _copy_tables(base, entries, place)
         with (new / TABLE).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([NAME, *columns])
@@ -294,6 +301,15 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
     except OSError as error:
         raise cannot_write(folder, error) from error
     return Sweep(folder)
+
+
+def _copy_tables(base: Path, entries: list[str], place: Path) -> None:
+    """Copy the tables of motions: the program looks for them in the folder of the namelist."""
+    text = "\n".join([base.read_text(encoding="utf-8", errors="replace"), *entries])
+    for name in {found.strip() for found in TABLE_OF_MOTION.findall(re.sub("!.*", "", text))}:
+        if (base.parent / name).is_file() and ".." not in Path(name).parts:
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(base.parent / name, place / name)
 
 
 def _problems_of_rows(base: Path, program: Path, rows: list[Row], overrides: list[list[str]], cores: int) -> list[str]:

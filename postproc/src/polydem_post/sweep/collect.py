@@ -33,6 +33,12 @@ COLUMNS = {
 #: Columns that hold numbers; the others hold texts
 NUMBERS = ("exit_code", "attempts", "wall", "threads")
 
+#: Groups of the namelist that change no bit of a state: runs that differ only in them are meant to agree
+WITHOUT_EFFECT = ("neighbours", "decomposition", "output", "checkpoint", "guards")
+
+#: So many runs with the same state are named
+MOST_NAMED = 4
+
 
 @dataclass
 class Outcome:
@@ -69,9 +75,33 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
             _write_hdf5(path, sweep, outcomes)
     except OSError as error:
         raise cannot_write(sweep.folder, error) from error
-    finished = sum(outcome.facts["state"] == FINISHED for outcome in outcomes)
-    say(f"{finished} of {len(outcomes)} runs are finished")
+    finished = [outcome for outcome in outcomes if outcome.facts["state"] == FINISHED]
+    say(f"{len(finished)} of {len(outcomes)} runs are finished")
+    for line in same_states(finished):
+        say(line)
     return outcomes
+
+
+def same_states(outcomes: list[Outcome]) -> list[str]:
+    """One line for all runs that ended in the same state, to the last bit, although it should differ."""
+    groups: dict[object, list[Outcome]] = {}
+    for outcome in outcomes:
+        if state := outcome.facts.get("state_hash"):
+            groups.setdefault(state, []).append(outcome)
+    lines = []
+    for group in groups.values():
+        varied = [entry for entry in group[0].parameters if len({run.parameters[entry] for run in group}) > 1]
+        acting = [entry for entry in varied if entry.lower().partition(".")[0] not in WITHOUT_EFFECT]
+        if len(group) == 1 or (varied and not acting):
+            continue
+        names = [run.name for run in group[:MOST_NAMED]]
+        if len(group) > MOST_NAMED:
+            names.append(f"{len(group) - MOST_NAMED} more")
+        why = f"{', '.join(acting)} had no effect" if acting else "their entries are the same"
+        if "scene.seed" in (entry.lower() for entry in acting):
+            why += " (a group with a seed of its own does not use it)"
+        lines.append(f"{', '.join(names)}: the same state hash: {why}; error bars must count them as one run")
+    return lines
 
 
 def read_outcome(run: Run) -> Outcome:

@@ -117,8 +117,8 @@ class Run {
   }
 
   /**
-   * Sums over the contacts of each body in the present frame: force, magnitudes of forces, number, and the symmetric
-   * part of arm times force.
+   * Sums over the contacts of each body in the present frame: force, magnitudes of forces, number of bodies that it
+   * touches, and the symmetric part of arm times force.
    */
   contactSums() {
     const {sums} = this;
@@ -127,13 +127,15 @@ class Run {
     sums.frame = this.frame;
     for (const sum of [fx, fy, load, count, xx, yy, xy]) sum.fill(0);
     for (let c = 0; c < t.n; c++) {
+      // Contacts of the same two bodies follow each other.
+      const another = !c || t.first[c] !== t.first[c - 1] || t.second[c] !== t.second[c - 1] ? 1 : 0;
       for (let sign = 1; sign >= -1; sign -= 2) {
         const i = sign > 0 ? t.first[c] : t.second[c];
         const x = sign * t.fx[c], y = sign * t.fy[c], rx = t.x[c] - this.x[i], ry = t.y[c] - this.y[i];
         fx[i] += x;
         fy[i] += y;
         load[i] += t.size[c];
-        count[i] += 1;
+        count[i] += another;
         xx[i] += rx * x;
         yy[i] += ry * y;
         xy[i] += 0.5 * (rx * y + ry * x);
