@@ -143,7 +143,8 @@ contains
             key//' is found')
       else if (kind_at(tokens, next + 1) /= equals_token) then
          call raise(error, input_error, &
-            place//': ''='' is expected after '//key//' in &'//statements(n)%group)
+            place//': ''='' is expected after '//key//' in &'//statements(n)%group//trim(merge(', not :', '       ', &
+                                                                                              scan(key, ':') > 0)))
       end if
       if (allocated(error)) return
 

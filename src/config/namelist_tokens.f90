@@ -18,6 +18,8 @@ module polydem_namelist_tokens
    character(len=*), parameter :: tab = achar(9), line_feed = achar(10), carriage_return = achar(13)
    !> Byte order mark of UTF-8
    character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+   !> First two bytes of typographic quotes, single and double, in UTF-8
+   character(len=*), parameter :: curly = char(226)//char(128)
    !> Characters that end a token without quotes
    character(len=*), parameter :: separators = ' '//tab//line_feed//carriage_return//'=,/!&''"'
 
@@ -168,14 +170,24 @@ contains
       if (k <= len(text)) end_of_quote = k
    end function end_of_quote
 
-   !> Reject control characters in a token, and characters beyond ASCII outside quotes.
+   !> Reject control characters in a token, characters beyond ASCII outside quotes, and signs of other formats.
    pure subroutine refuse_characters(source, token, error)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: token
       type(error_t), allocatable, intent(inout) :: error
       integer :: code, k
 
+      if (token%kind == bare_token .and. scan(source%text(token%first:token%last), '#') > 0) call raise(error, &
+         input_error, source%place(token%line)//': # is not allowed here; a comment begins with !')
+      if (source%text(token%last:token%last) == ':' .and. token%kind == bare_token) call raise(error, input_error, &
+         source%place(token%line)//': the sign between a key and its value is =, not :')
+      if (allocated(error)) return
       do k = token%first, token%last
+         if (token%kind /= quoted_token .and. source%text(k:min(k + 1, token%last)) == curly) then
+            call raise(error, input_error, source%place(token%line)//': a text is in straight quotes, '' or ", not '// &
+                       'in typographic ones as a text processor makes them')
+            return
+         end if
          code = iachar(source%text(k:k))
          if ((code < 32 .and. source%text(k:k) /= tab) .or. code == 127 &
             .or. (token%kind /= quoted_token .and. code > 127)) then

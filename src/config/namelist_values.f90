@@ -80,8 +80,12 @@ contains
       character(len=:), allocatable :: text
 
       text = ''
-      if (entry%count /= 1 .or. size(statement%values) /= 2 .or. entry%type /= 'real') return
-      if (is_number(lower_case(statement%values(2)%text))) then
+      if (index(entry%meaning, 'Smallest and largest') == 1 .and. size(statement%values) == 1) then
+         if (is_number(lower_case(statement%values(1)%text))) text = ', the smallest and the largest; write '// &
+            statement%values(1)%text//', '//statement%values(1)%text
+      else if (entry%count /= 1 .or. size(statement%values) /= 2 .or. entry%type /= 'real') then
+         return
+      else if (is_number(lower_case(statement%values(2)%text))) then
          text = '; a number has a decimal point, no comma'
       else
          text = '; write the number alone'

@@ -181,10 +181,22 @@ contains
          associate (decider => instance%values(row_of(instance, key)))
             if (decider%is_override .and. .not. given%is_override) return
             call raise(error, input_error, given%place//': '//label(entries(home))//' is used only with '//key// &
-               ' = '//join(split_words(needs), ' or ')//', not with '//decider%text)
+               ' = '//join(split_words(needs), ' or ')//', not with '//decider%text// &
+               remedy(instance%group, key, given%key))
          end associate
       end associate
    end subroutine check_use
+
+   !> What else to use in place of an entry that is not in use; empty if nothing is known
+   pure function remedy(group, decider, key) result(text)
+      !> Group, entry that decides, and entry that is not in use
+      character(len=*), intent(in) :: group, decider, key
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (group == 'cell' .and. decider == 'periodic' .and. key == 'obeys') text = '; a wall obeys a stress with a '// &
+         'group &load'
+   end function remedy
 
    !> Check that each name in an entry is that of a group which the entry refers to. An empty name refers to none.
    pure subroutine check_reference(entry, value, instances, error)

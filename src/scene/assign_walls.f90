@@ -5,12 +5,13 @@ module polydem_assign_walls
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion_file, only: read_motion_table
    use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls
+   use polydem_named_walls, only: named_walls_t
    use polydem_outlines, only: pi
    use polydem_prescribed_motion, only: motion_t
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
-   use polydem_strings, only: to_text
+   use polydem_strings, only: text_t, to_text
    use polydem_wall, only: new_wall, wall_t
    use polydem_wall_bodies, only: wall_bodies_t
    use polydem_walls, only: walls_t
@@ -37,7 +38,43 @@ contains
       if (allocated(error)) return
       call name_walls(settings, bodies, named, walls%driven, walls%named)
       call assign_loads(settings, named, walls%loads)
+      call check_sample(settings, bodies, walls%named, error)
    end subroutine assign_walls
+
+   !> Check that the walls that bound the sample along an axis are apart along it.
+   subroutine check_sample(settings, bodies, named, error)
+      type(settings_t), intent(in) :: settings
+      type(bodies_t), intent(in) :: bodies
+      type(named_walls_t), intent(in) :: named
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (settings%sample%area /= 'walls') return
+      call check_pair(settings%sample%sides, 'sides', 'the walls on the left and on the right', 1)
+      call check_pair(settings%sample%ends, 'ends', 'the walls below and above', 2)
+
+   contains
+
+      !> Check the walls that bound it along an axis.
+      subroutine check_pair(names, key, meaning, axis)
+         type(text_t), intent(in) :: names(:)
+         !> The entry, and what its walls are
+         character(len=*), intent(in) :: key, meaning
+         integer, intent(in) :: axis
+         integer(ip) :: k, pair(2)
+
+         if (size(names) /= 2) return
+         pair = 0_ip
+         do k = 1_ip, size(named%wall, kind=ip)
+            if (named%wall(k)%name == names(1)%text) pair(1) = k
+            if (named%wall(k)%name == names(2)%text) pair(2) = k
+         end do
+         if (named%gap(pair, axis, bodies) > 0.0_wp) return
+         call raise(error, input_error, place_of(settings, 'sample', key)//': '''//key//''' in &sample: the walls '// &
+                    names(1)%text//' and '//names(2)%text//' are not apart along '//'xy'(axis:axis)// &
+                    ', so there is no sample between them; '''//key//''' names '//meaning)
+      end subroutine check_pair
+
+   end subroutine check_sample
 
    !> Find the bodies of each prescribed motion and load, and make walls of those with the same ones.
    subroutine assign_motions(settings, bodies, named, walls, error)

@@ -27,6 +27,9 @@ module polydem_motion_check
    !> Fraction of the stable time step above which a run warns
    real(wp), parameter :: warn_share = 0.5_wp
 
+   !> Number of steps after which a fast body may have fallen for long
+   integer(lp), parameter :: early = 1000_lp
+
 contains
 
    !> Clause that says how to shorten the time step: 'reduce dt' if the user chose it
@@ -245,6 +248,8 @@ contains
          text = text//'It is part of a wall: check the motion of the wall, or sign and unit of the load on it'
       else
          text = text//'Check for deep overlaps at the start, or '//check%remedy
+         if (step > early) text = text//'. A body that has left the scene falls ever faster: add a wall that holds '// &
+            'it, or a &sink where it leaves'
       end if
    end function motion_text
 

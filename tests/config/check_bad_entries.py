@@ -65,7 +65,8 @@ PARTS = {
               "grading": {"grading": "1, 0, 2, 1"}}, "momentum": {"random": {}, "zero": {}},
 }
 #: Required entries of groups that need a scene of parts
-REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x"}, "stage": {},
+REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x", "force": "1"},
+            "stage": {},
             "source": {"low": "0.3, 0.3", "high": "0.5, 0.5", "count": "9"},
             "sink": {"low": "-1, -3", "high": "2, -2.5"},
             "sample": {},

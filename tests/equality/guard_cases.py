@@ -336,6 +336,8 @@ def base_of(entry, base):
         base.setdefault(f"motion.{NAME}.kind", "rotation")
     if entry.name.startswith("load."):
         base = {f"load.{NAME}.wall": NAME, f"load.{NAME}.direction": "x", **base}
+        if not entry.name.endswith((".stress", ".width")):
+            base[f"load.{NAME}.force"] = VARIED[f"load.{NAME}.force"]
     return base
 
 

@@ -128,6 +128,8 @@ def a_frame_is_a_start_without_history(case):
     rest = "&forces stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 1e-3", scheme="")
     output = case.run(scene.format(frame=12) + rest, "from_frame")
     assert "from frame 12 of film" in output and "contact history and accelerations begin anew" in output, output
+    output = case.run(scene.format(frame=-1) + rest, "from_last_frame")
+    assert "from the last frame of film, at " in output, output
     message = case.run(scene.format(frame=999) + rest, "no_frame", code=BAD_INPUT)
     assert "no_frame.nml:1: 'start_from' in &scene: film has no frame 999" in message, message
 

@@ -45,7 +45,7 @@ contains
       character(len=*), parameter :: pair = &
          '&grains name = ''block'' region = ''at'' at = 0, 0.05 shape = ''rectangle'' width = 0.1 height = 0.1 '// &
          'density = 1000 / &wall name = ''plate'' outline = ''rectangle'' low = -0.05, -0.1 high = 0.05, 1e-4 / '// &
-         '&load name = ''l'' wall = ''plate'' direction = ''y'' mass = 20 damping_ratio = 0 / '// &
+         '&load name = ''l'' wall = ''plate'' direction = ''y'' force = 0 mass = 20 damping_ratio = 0 / '// &
          '&forces gravity = 0, 0 stiffness = 1e5 damping = ''none'' friction = ''none'' / '
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error

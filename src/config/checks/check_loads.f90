@@ -2,7 +2,7 @@
 module polydem_check_loads
    use polydem_blame_entry, only: blame
    use polydem_errors, only: error_t
-   use polydem_group_instances, only: index_of_instance, instance_t
+   use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: wp
    use polydem_settings, only: load_settings_t, motion_settings_t, settings_t
    implicit none
@@ -62,6 +62,10 @@ contains
       end if
       if (load%mass > 0.0_wp .and. load%mass < 1.0e-12_wp) call blame(instance, 'mass', &
          'must be 0, or at least 1e-12', error)
+      if (load%direction /= 'angle' .and. .not. any([instance%values(row_of(instance, 'force'))%is_given, &
+         instance%values(row_of(instance, 'stress'))%is_given])) call blame(instance, 'force', 'and ''stress'' are '// &
+         'both missing; give one of them, for example force = -100. A wall that yields to the grains alone has '// &
+         'force = 0', error)
       if (load%end > 0.0_wp .and. load%end <= load%start) call blame(instance, 'end', 'must be behind ''start''', &
          error, 'start')
    end subroutine check_width
@@ -88,6 +92,8 @@ contains
             associate (motion => settings%motion(k))
                if (motion%wall /= load%wall .and. (motion%wall /= '' .or. size(motion%bodies) > 0)) cycle
                if (are_in_different_stages(load%stage, motion%stage)) cycle
+               ! The end of such a motion is an error of its own.
+               if (motion%end > 0.0_wp .and. motion%end <= motion%start) cycle
                if (.not. meet(load%start, load%end, motion%start, motion%end)) cycle
                if (moves_along(load%direction, motion)) call blame(instance, 'direction', 'is one in which the '// &
                   'motion '//motion%name//' moves the same wall'//one_of_them, error)

@@ -4,6 +4,7 @@ module polydem_check_settings
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: lp, wp
    use polydem_settings, only: settings_t
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: check_settings
@@ -201,10 +202,66 @@ contains
          if (settings%motion(k)%kind == 'rotation') call blame( &
             instances(index_of_instance(instances, 'motion', settings%motion(k)%name)), 'kind', no_rotation, error)
       end do
+      call check_parts_in_cell(settings, instances, error)
       if (settings%output%trace_steps > 0) call blame(instances(index_of_instance(instances, 'output')), &
          'trace_steps', 'must be 0 in a periodic cell, where the number of boxes changes', error)
       if (settings%cell%obeys /= 'none') call check_yielding_cell(settings, instances, error)
    end subroutine check_cell
+
+   !> Check that regions of grains and rows of fixed grains are not longer than the cell, whose copies would overlap.
+   pure subroutine check_parts_in_cell(settings, instances, error)
+      type(settings_t), intent(in) :: settings
+      type(instance_t), intent(in) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: extent(2)
+      integer :: k
+
+      do k = 1, size(settings%grains)
+         associate (group => settings%grains(k))
+            extent = 0.0_wp
+            select case (group%region)
+            case ('box')
+               extent = group%high - group%low
+            case ('disc')
+               extent = 2.0_wp*group%radius
+            case ('polygon')
+               if (size(group%vertices) >= 4) extent = [maxval(group%vertices(1::2)) - minval(group%vertices(1::2)), &
+                                                        maxval(group%vertices(2::2)) - minval(group%vertices(2::2))]
+            case default
+               ! The region follows from a wall, or is a point.
+            end select
+            call check_length(extent, 'region', instances(index_of_instance(instances, 'grains', group%name)), error)
+         end associate
+      end do
+      do k = 1, size(settings%wall)
+         if (settings%wall(k)%outline == 'row') call check_length(abs(settings%wall(k)%to - settings%wall(k)%from), &
+            'to', instances(index_of_instance(instances, 'wall', settings%wall(k)%name)), error)
+      end do
+
+   contains
+
+      !> Compare lengths with those of the cell.
+      pure subroutine check_length(length, key, instance, error)
+         !> Length of the part along x and y [m]
+         real(wp), intent(in) :: length(2)
+         !> Entry that gives the length
+         character(len=*), intent(in) :: key
+         type(instance_t), intent(in) :: instance
+         type(error_t), allocatable, intent(inout) :: error
+         integer :: axis
+
+         do axis = 1, 2
+            associate (period => settings%cell%size(axis))
+               if (scan(settings%cell%periodic, 'xy'(axis:axis)) == 0 .or. length(axis) <= 1.000001_wp*period) cycle
+               call raise(error, input_error, instance%values(row_of(instance, key))%place//': '''//key//''' in &'// &
+                  trim(instance%group)//' '//instance%name//': its length along '//'xy'(axis:axis)//' is '// &
+                  to_text(length(axis), 3)//' m, but the periodic cell is only '//to_text(period, 3)// &
+                  ' m long, so it would overlap its copies; make it at most as long as the cell (''size'' in &cell)')
+            end associate
+         end do
+      end subroutine check_length
+
+   end subroutine check_parts_in_cell
 
    !> Check what cannot be combined with a cell whose size obeys a stress.
    pure subroutine check_yielding_cell(settings, instances, error)
@@ -216,6 +273,11 @@ contains
       associate (cell => instances(index_of_instance(instances, 'cell')))
          if (abs(settings%cell%shear_rate) > 0.0_wp .and. scan(settings%cell%obeys, 'x') > 0) call blame(cell, &
             'obeys', 'must be ''y'' in a sheared cell', error)
+         do k = 1, 2
+            if (scan(settings%cell%obeys, 'xy'(k:k)) > 0 .or. .not. abs(settings%cell%stress(k)) > 0.0_wp) cycle
+            call blame(cell, 'stress', 'must be 0 along '//'xy'(k:k)//', where the cell has a constant size; or '// &
+                       'give obeys = ''xy''', error)
+         end do
          if (any(abs(settings%forces%gravity) > 0.0_wp)) call blame(cell, 'obeys', &
             'needs gravity = 0, 0 in &forces, since a cell without walls falls with what it has', error)
          do k = 1, size(settings%stage)

@@ -31,7 +31,7 @@ contains
    subroutine find_frame(folder, number, path, row, time, error)
       !> Result folder
       character(len=*), intent(in) :: folder
-      !> Number of the frame in the result, from 0
+      !> Number of the frame in the result, from 0; -1: its last frame
       integer(ip), intent(in) :: number
       !> Path of the segment
       character(len=:), allocatable, intent(out) :: path
@@ -43,9 +43,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       real(dp), allocatable :: times(:)
+      character(len=:), allocatable :: last
+      integer(lp) :: n, passed
       integer(ip) :: k
 
       row = int(number, lp)
+      if (number < 0_ip) row = huge(row)
+      n = 0_lp
+      passed = 0_lp
       time = 0.0_dp
       k = 1_ip
       do while (exists(segment_path(folder, k), error))
@@ -60,10 +65,20 @@ contains
             return
          end if
          row = row - size(times, kind=lp)
+         passed = passed + size(times, kind=lp)
          k = k + 1_ip
+         if (size(times) == 0) cycle
+         last = path
+         n = size(times, kind=lp)
+         time = times(n)
       end do
+      if (number < 0_ip .and. n > 0_lp) then
+         path = last
+         row = n - 1_lp
+         return
+      end if
       call raise(error, input_error, folder//' has no frame '//to_text(number)//' in closed segments, only '// &
-                 to_text(int(number, lp) - row)//' frames, counted from 0')
+                 to_text(passed)//' frames, counted from 0')
    end subroutine find_frame
 
    !> Whether the shapes of the bodies of a segment are consistent

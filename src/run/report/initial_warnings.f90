@@ -4,6 +4,7 @@
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse
+   use polydem_entry_warnings, only: add, warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
    use polydem_motion_check, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
@@ -61,6 +62,7 @@ contains
       call warn_of_regions(simulation%settings, warnings)
       call warn_of_tables(simulation, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
+      call warn_of_entries(simulation, measures, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
       if (undamped /= '') call add(warnings, undamped)
@@ -166,18 +168,23 @@ contains
       type(simulation_t), intent(in) :: simulation
       type(scene_measures_t), intent(in) :: measures
       type(text_t), allocatable, intent(inout) :: warnings(:)
+      character(len=:), allocatable :: remedy
       logical :: is_energetic
 
       if (measures%contacts == 0_lp) return
       is_energetic = measures%stored > measures%kinetic + measures%potential .and. &
          measures%depth_share > simulation%settings%guards%listed_depth
       if (measures%depth_share <= deep_fraction .and. .not. is_energetic) return
+      ! Contacts of a result are as deep as loads have made them.
+      remedy = '. The result from which the run starts has them'
+      if (simulation%settings%scene%name /= 'result') remedy = '. Separate the bodies: '// &
+         trim(merge('set   ', 'reduce', .not. simulation%settings%scene%remove_overlap > 0.0_wp))// &
+         ' remove_overlap in &scene'
       call add(warnings, 'deep contacts at the start: '//to_text(measures%deep)//'; in the deepest '// &
                measures%deepest//'. All contacts store '//to_text(measures%stored, 3)//' J/m, which can '// &
                'accelerate all free bodies to '// &
                to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
-               ' m/s. Separate the bodies: '//merge('set   ', 'reduce', &
-               .not. simulation%settings%scene%remove_overlap > 0.0_wp)//' remove_overlap in &scene')
+               ' m/s'//remedy)
    end subroutine warn_of_overlaps
 
    !> Warn of bodies that can pass through others: by moving too far in one step, or by their momentum.
@@ -207,16 +214,23 @@ contains
       end associate
    end subroutine warn_of_speeds
 
-   !> Warn of fixed bodies that overlap at the start. Every rank has all of them.
+   !> Warn of fixed bodies that overlap at the start, unless a load moves one of them: a wall that yields passes over
+   !> others. Every rank has all of them.
    subroutine warn_of_fixed_overlaps(simulation, warnings)
       type(simulation_t), intent(in) :: simulation
       type(text_t), allocatable, intent(inout) :: warnings(:)
       integer(lp) :: n
       integer(ip) :: first, second
       real(wp) :: area, place(2)
+      logical, allocatable :: yields(:)
+      integer :: k
 
       associate (bodies => simulation%bodies)
-         call find_fixed_overlaps(bodies, n, first, second, area, place)
+         yields = spread(.false., 1, bodies%n)
+         do k = 1, size(simulation%walls%driven)
+            if (simulation%walls%driven(k)%is_loaded) yields(simulation%walls%driven(k)%slots) = .true.
+         end do
+         call find_fixed_overlaps(bodies, yields, n, first, second, area, place)
          if (n == 0_lp) return
          call add(warnings, counted(n, 'pair')//' of fixed bodies overlap, most of all the bodies '// &
                   to_text(bodies%id(first))//' and '//to_text(bodies%id(second))//' in '//to_text(area, 3)// &
@@ -247,13 +261,5 @@ contains
             'bodies: rounding changes the forces of contacts. '//remedy//', or decrease stiffness in &forces')
       end associate
    end subroutine warn_of_rounding
-
-   !> Append a warning to the list.
-   pure subroutine add(warnings, text)
-      type(text_t), allocatable, intent(inout) :: warnings(:)
-      character(len=*), intent(in) :: text
-
-      warnings = [warnings, text_t(text)]
-   end subroutine add
 
 end module polydem_initial_warnings

@@ -52,7 +52,7 @@ contains
       type(origin_t), intent(out) :: origin
       !> Names the entry and what is wrong with the result
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: folder
+      character(len=:), allocatable :: folder, which
       real(dp) :: time
       integer(ip) :: number
       integer :: colon, status
@@ -60,14 +60,17 @@ contains
       folder = settings%scene%start_from
       colon = index(folder, ':', back=.true.)
       if (colon > 0) then
-         if (verify(folder(colon + 1:), '0123456789') == 0 .and. colon < len(folder)) then
+         if ((verify(folder(colon + 1:), '0123456789') == 0 .or. folder(colon + 1:) == '-1') .and. &
+             colon < len(folder)) then
             read (folder(colon + 1:), *, iostat=status) number
             if (status /= 0) number = huge(1_ip)
             folder = folder(:colon - 1)
             origin%is_frame = .true.
             call find_frame(folder, number, origin%path, origin%row, time, error)
-            if (.not. allocated(error)) origin%note = 'start      from frame '//to_text(number)//' of '//folder// &
-               ', at '//to_text(real(time, wp))//' s; contact history and accelerations begin anew'
+            which = 'frame '//to_text(number)
+            if (number < 0_ip) which = 'the last frame'
+            if (.not. allocated(error)) origin%note = 'start      from '//which//' of '//folder//', at '// &
+               to_text(real(time, wp))//' s; contact history and accelerations begin anew'
          end if
       end if
       if (.not. origin%is_frame) call find_checkpoint(folder, origin, error)

@@ -117,7 +117,8 @@ contains
                    + contacts%elastic(c)*contacts%area(c)/contacts%length(c)*mobility)
       text = '. Its bodies met at about '//to_text(speed, 3)//' m/s; dt is chosen for '// &
          to_text(self%expected%speed, 3)//' m/s ('//self%expected%origin//'). '
-      if (speed > self%expected%speed) then
+      ! The step of bodies of several pieces does not depend on the speed.
+      if (speed > self%expected%speed .and. self%bodies%pieces%most == 1_ip) then
          text = text//'Increase speed in &integrate'
       else
          text = text//'Reduce safety_factor in &integrate'

@@ -202,18 +202,24 @@ contains
       type(simulation_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
 
-      character(len=:), allocatable :: key
+      character(len=:), allocatable :: key, place, remedy
 
       if (self%dt*self%body_forces%rate() <= greatest_change) return
       associate (forces => self%settings%forces, rate => self%body_forces%rate())
          key = 'drag'
          if (two_pi*abs(forces%turn_rate) >= rate) key = 'turn_rate'
          if (two_pi*forces%shake_frequency >= rate) key = 'shake_frequency'
-         call raise(error, input_error, place_of(self%settings, 'forces', key)//': with dt = '//to_text(self%dt)// &
+         remedy = 'Set dt in &integrate to at most '//to_text(greatest_change/rate, 2)//', '
+         ! A step so long follows from a stiffness without its unit more often than from a large rate.
+         if (.not. self%settings%integrate%dt > 0.0_wp) remedy = 'This dt follows from stiffness = '// &
+            to_text(self%law%pairs%stiffness%least(), 3)//' N/m2: increase it in &forces (is it in N/m2?), set '// &
+            'dt to at most '//to_text(greatest_change/rate, 2)//', '
+         place = place_of(self%settings, 'forces', key)
+         if (place == self%settings%file) place = place_of(self%settings, 'forces', 'stiffness')
+         call raise(error, input_error, place//': with dt = '//to_text(self%dt)// &
                     ' s a rate of '//to_text(rate)//' 1/s changes '// &
                     trim(merge('a velocity  ', 'acceleration', key == 'drag'))//' by more than a tenth in a step. '// &
-                    'Set dt in &integrate to at most '//to_text(greatest_change/rate, 2)//', or decrease '//key// &
-                    ' in &forces')
+                    remedy//'or decrease '//key//' in &forces')
       end associate
    end subroutine check_rate
 
