@@ -48,7 +48,8 @@ contains
       if (.not. ended_at_once(simulation, number, steps)) return
       call log%write_line('warning: stage '//simulation%settings%stage(number)%name//' ended at its first check, '// &
          'after '//to_text(real(steps, wp)*simulation%dt, 3)//' s: its condition held from the start. Grains at '// &
-         'rest before they fall have no energy, for example: give hold, the time for which it must hold, or another limit')
+         'rest before they fall have no energy, for example: give hold, the time for which it must hold, or '// &
+         'another limit')
    end subroutine warn_of_end
 
    !> Warn of a cell whose damping bears much of the stress.
