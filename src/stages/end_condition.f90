@@ -16,7 +16,8 @@ module polydem_end_condition
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: is_check, needs_contacts, measure_condition, decide_end, pass_end, condition_text, is_at_limit, ended_at_once
+   public :: is_check, needs_contacts, measure_condition, decide_end, pass_end, condition_text, is_at_limit, &
+             ended_at_once
 
 contains
 

@@ -152,8 +152,8 @@ contains
       do k = 1, size(self%settings%load)
          associate (load => self%settings%load(k))
             if (usual > 0.0_wp .or. load%mass > 0.0_wp) cycle
-            call raise(error, input_error, place_of(self%settings, 'load.'//load%name, 'mass')//': ''mass'' in &load '// &
-               load%name//' is needed: there are no free bodies at the start, whose mass it could have')
+            call raise(error, input_error, place_of(self%settings, 'load.'//load%name, 'mass')//': ''mass'' in '// &
+               '&load '//load%name//' is needed: there are no free bodies at the start, whose mass it could have')
             return
          end associate
       end do
