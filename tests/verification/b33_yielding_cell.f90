@@ -118,7 +118,7 @@ contains
    !> The energy that is missing after a fast compression, with the time step and with a half of it.
    subroutine close_energy(table)
       type(table_t), intent(inout) :: table
-      character(len=*), parameter :: cell = 'obeys = ''xy'' stress = 1e4, 1.2e4 damping_ratio = 0.2'
+      character(len=*), parameter :: cell = 'obeys = ''xy'' stress = 1e4, 1.2e4 mass = 21 damping_ratio = 0.2'
       type(error_t), allocatable :: error
       real(wp) :: missing(2), work
 
