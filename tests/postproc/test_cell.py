@@ -141,7 +141,8 @@ def test_fields_cover_the_cell_and_know_its_copies(trajectory):
 
 def test_a_cell_that_obeys_a_stress_has_another_size_in_each_frame(tmp_path):
     """Finds frames with the size of the start: arms across the border would be as long as the cell."""
-    scene = SCENE.replace("size = 0.06, 0.05", "size = 0.06, 0.05 obeys = 'xy' stress = 2e3, 1e3 mass = 0.05")
+    scene = SCENE.replace("size = 0.06, 0.05", "size = 0.06, 0.05 obeys = 'xy' stress = 2e3, 1e3 mass = 0.05"
+                          " damping_ratio = 1")
     scene = scene.replace("contacts =", "series_interval = 1e-3 contacts =").format(folder=tmp_path / "result")
     (tmp_path / "pressed.nml").write_text(scene, encoding="utf-8")
     subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", tmp_path / "pressed.nml"], check=True, stdout=subprocess.PIPE)
