@@ -102,7 +102,7 @@ VARIED = {
     "wall.one.bodies": None, "wall.one.vanish_at": "0.01", "motion.one.wall": "one",
     "load.one.wall": "one", "load.one.force": "20", "load.one.stress": "200", "load.one.width": "0.2",
     "load.one.between": None, "load.one.torque": "1", "load.one.pivot": "0.01, 0.02", "load.one.mass": "2",
-    "load.one.damping_ratio": "0.1", "load.one.start": "0.005", "load.one.end": "0.015", "load.one.ramp": "0.01",
+    "load.one.damping_ratio": "0.3", "load.one.start": "0.005", "load.one.end": "0.015", "load.one.ramp": "0.01",
     "grains.one.low": "-0.05, -0.05", "grains.one.high": "0.05, 0.05", "grains.one.centre": "0.01, 0",
     "grains.one.radius": "0.08", "grains.one.vertices": "-0.05, -0.05, 0.05, -0.05, 0, 0.05", "grains.one.wall": "one",
     "grains.one.at": "0.01, 0", "grains.one.number": "30", "grains.one.number@at": None,

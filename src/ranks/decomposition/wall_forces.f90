@@ -54,7 +54,8 @@ contains
       end do
    end subroutine list_terms
 
-   !> Sum the terms of each fixed body in descending order of keys.
+   !> Sum the terms of each fixed body in descending order of keys. Terms with the same key, of the pieces of one free
+   !> body, come from one rank in the order of its sums, which they keep.
    subroutine sum_terms(keys, terms, bodies)
       integer(lp), intent(in) :: keys(:)
       real(wp), intent(in) :: terms(:, :)
@@ -63,15 +64,15 @@ contains
       real(wp) :: total(n_terms)
       integer(ip) :: k, s
 
-      order = ascending_order(keys)
-      k = size(order, kind=ip)
+      order = ascending_order(-keys)
+      k = 1_ip
       do s = bodies%n, 1_ip, -1_ip
          if (.not. bodies%fixed(s)) cycle
          total = 0.0_wp
-         do while (k > 0_ip)
+         do while (k <= size(order))
             if (first_of(keys(order(k))) /= bodies%global_index(s)) exit
             total = total + terms(:, order(k))
-            k = k - 1_ip
+            k = k + 1_ip
          end do
          call set_force(total, s, bodies)
       end do
