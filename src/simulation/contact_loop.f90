@@ -24,7 +24,7 @@ module polydem_contact_loop
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
    use polydem_timers, only: block_clock_t
    use polydem_loop_results, only: range_results_t, loop_results_t
-   use polydem_wall_shares, only: find_shares, set_shares
+   use polydem_contact_shares, only: find_shares, set_shares
    use polydem_wall_terms, only: append_border, append_walls, join_walls
    implicit none
    private

@@ -7,7 +7,7 @@ module polydem_loop_results
    use polydem_force_sums, only: force_sums_t, term_list_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_contact_flags, only: flag_limits_t
-   use polydem_wall_shares, only: wall_shares_t
+   use polydem_contact_shares, only: contact_shares_t
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
@@ -47,8 +47,8 @@ module polydem_loop_results
       type(force_sums_t) :: force_sums
       !> Contacts with fixed bodies
       type(wall_terms_t) :: walls
-      !> Shares of contacts with fixed bodies, if the force law needs them
-      type(wall_shares_t) :: shares
+      !> Shares of contacts between the same two bodies, if the force law needs them
+      type(contact_shares_t) :: shares
       !> Limits beyond which contacts are flagged
       type(flag_limits_t) :: flag_limits
       !> Contacts that are deep, degenerate or stiff

@@ -87,6 +87,27 @@ def test_equal_materials_have_the_bits_of_one_and_names_may_change_places(tmp_pa
     assert hashes["equal"] == hashes["none"] != hashes["unlike"] == hashes["turned"]
 
 
+#: Tables of three pieces that land on the one fixed body
+TABLES = """\
+&wall name = 'floor' outline = 'rectangle' low = -0.1, -0.02 high = 0.1, 0 /
+&grains name = 'tables' region = 'box' low = -0.09, 1e-3 high = 0.09, 0.07 number = 10 velocity = 0.1, -0.5
+   shape = 'outline' outline_corners = 4, 4, 4 outline_pieces = 3 angle = -8, 8
+   outline = 0, 0, 3e-3, 0, 3e-3, 0.01, 0, 0.01, 7e-3, 0, 0.01, 0, 0.01, 0.01, 7e-3, 0.01,
+             3e-3, 7e-3, 7e-3, 7e-3, 7e-3, 0.01, 3e-3, 0.01 /
+&forces stiffness = 1e6 restitution = 0.3 /
+&integrate dt = 1e-5 duration = 0.08 /
+"""
+
+
+def test_contacts_that_share_the_damping_of_one_floor_have_the_same_bits(tmp_path):
+    (tmp_path / "scene.nml").write_text(TABLES, encoding="utf-8")
+    one, _ = run(tmp_path / "scene.nml", tmp_path / "one")
+    assert count(one, "contacts") > 1000
+    for ranks in (2, 3):
+        several, _ = run(tmp_path / "scene.nml", tmp_path / str(ranks), ranks)
+        assert state_hash(several) == state_hash(one)
+
+
 #: Fast grains that fly through the areas of all ranks
 FAST = """\
 &scene name = 'gas' bodies = 60 solid_fraction = 0.2 speed = 1.75 spin = 175 seed = 641 /

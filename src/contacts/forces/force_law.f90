@@ -38,7 +38,7 @@ module polydem_force_law
       logical :: needs_cohesion = .false.
       !> Whether a part adds to the column `twist`
       logical :: needs_twist = .false.
-      !> Whether a part needs the shares of contacts with fixed bodies
+      !> Whether a part needs the shares of contacts between the same two bodies
       logical :: needs_shares = .false.
       !> Whether a part needs the accelerations of the last step
       logical :: needs_accelerations = .false.

@@ -51,7 +51,7 @@ module polydem_force_part
       logical :: needs_cohesion = .false., cohesion_has_energy = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.
-      !> Whether it needs the shares of contacts with fixed bodies
+      !> Whether it needs the shares of contacts between the same two bodies
       logical :: needs_shares = .false.
       !> Whether it needs the accelerations of the last step
       logical :: needs_accelerations = .false.

@@ -1,18 +1,23 @@
-!> Shares of the contacts of a free body with several fixed bodies, such as the pieces of one floor.
+!> Shares of contacts that act at once between two bodies, where all fixed bodies together count as one: the pieces of a
+!> floor or of a grain, the feet of a table.
 !>
-!> A dashpot for a given restitution, c = 2 zeta sqrt(m k), belongs to all contacts that stop the body together. If each
-!> of n equal contacts had it for its own stiffness k, the sum would be sqrt(n) times too strong: a floor that is cut
-!> into five pieces would damp twice as much as the whole one. Contact i with the fixed body i gets
+!> A dashpot for a given restitution, c = 2 zeta sqrt(m k), belongs to all contacts of two bodies together. If each of n
+!> equal contacts had it for its own stiffness k, the sum would be sqrt(n) times too strong: a floor that is cut into
+!> five pieces would damp twice as much as the whole one. Contact i gets
 !>
 !>     c_i = 2 zeta sqrt(m k_i s_i),     s_i = k_i/sum_j k_j (n_i . n_j)^2,
 !>
-!> where the sum runs over all contacts of the free body with fixed bodies. Then the sum of all c_i is 2 zeta sqrt(m k)
-!> for the stiffness k of all, however the floor is cut, and a contact alone, or one among others in perpendicular
-!> directions, has the share 1.
+!> where the sum runs over all contacts of the same two bodies. Then the sum of all c_i is 2 zeta sqrt(m k) for the
+!> stiffness k of all, however the bodies are cut, and a contact alone, or one among others in perpendicular directions,
+!> has the share 1. This is c_i = 2 zeta k_i/w_i, where w_i^2 is the Rayleigh quotient of the stiffness of all these
+!> contacts for the translation along n_i. It is exact for parallel contacts. For two equal contacts whose normals make
+!> the angle a, an impact along their bisector has the damping ratio zeta sqrt((1 + cos a)/(1 + cos(a)^2)), at most
+!> 1.10 zeta. Contacts with several free bodies do not share: a body of the mass M that hits n free bodies of the mass m
+!> at once has the damping ratio zeta sqrt((M + n m)/(M + m)).
 !>
-!> The shares are those of the present step, so nothing is remembered. The contacts in question are few: their overlaps
-!> are found here, before the loop over all contacts finds them again.
-module polydem_wall_shares
+!> The shares are those of the present step, so nothing is remembered. The overlaps of these contacts are found here,
+!> before the loop over all contacts finds them again.
+module polydem_contact_shares
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
@@ -21,28 +26,33 @@ module polydem_wall_shares
    use polydem_grow, only: grow
    use polydem_kinds, only: ip, min_parallel_size, wp
    use polydem_pair_list, only: pair_list_t
-   use polydem_pieces, only: pieces_t
    implicit none
    private
-   public :: wall_shares_t, find_shares, set_shares
+   public :: contact_shares_t, find_shares, set_shares
 
-   !> Pairs of free bodies that have pairs with several fixed bodies
-   type :: wall_shares_t
-      !> Number of these pairs
+   !> Pairs of pieces in groups: those of one free body with all fixed bodies, or of two free bodies
+   type :: contact_shares_t
+      !> Number of pairs of groups with several pairs
       integer(ip) :: n = 0_ip
-      !> Their indices in the pair list, ascending, and the slots of their free bodies
-      integer(ip), allocatable :: pair(:), body(:)
+      !> Their indices in the pair list, ascending
+      integer(ip), allocatable :: pair(:)
       !> Square root of the share of each
       real(wp), allocatable :: root(:)
+      !> Group of each: the slot of its free body, or for two free bodies a number above all slots
+      integer(ip), allocatable, private :: group(:)
       !> Ratio L/l of each contact, 0 if the polygons do not overlap, and its direction, (x or y, pair)
       real(wp), allocatable, private :: ratio(:), direction(:, :)
-      !> Number of pairs, then of contacts, of each free body with fixed bodies, (slot); 0 between two steps
+      !> Greatest number of a group
+      integer(ip), private :: n_groups = 0_ip
+      !> Number of pairs, then of contacts, of each group; 0 between two steps
       integer(ip), allocatable, private :: count_of(:)
-      !> Sums of L/l n n^T over the contacts of each free body: xx, xy, yy, (3, slot)
+      !> Sums of L/l n n^T over the contacts of each group: xx, xy, yy, (3, group)
       real(wp), allocatable, private :: tensor(:, :)
+      !> Group of one free body with each other, (slot); 0 between two bodies
+      integer(ip), allocatable, private :: group_with(:)
       !> Remembered edges of the pairs of each block, a copy
       type(contact_history_t), allocatable, private :: mine(:)
-   end type wall_shares_t
+   end type contact_shares_t
 
 contains
 
@@ -55,7 +65,7 @@ contains
       type(pair_list_t), intent(in) :: pairs
       !> Contact history of the pairs; it is not changed
       type(contact_history_t), intent(in) :: history
-      type(wall_shares_t), intent(inout) :: shares
+      type(contact_shares_t), intent(inout) :: shares
       integer(ip) :: low
 
       call list_pairs(bodies, pairs, shares)
@@ -69,16 +79,31 @@ contains
       call divide(shares)
    end subroutine find_shares
 
-   !> List the pairs of free bodies that have several fixed partners.
+   !> List the pairs of groups with several pairs.
    subroutine list_pairs(bodies, pairs, shares)
       type(bodies_t), intent(in) :: bodies
       type(pair_list_t), intent(in) :: pairs
-      type(wall_shares_t), intent(inout) :: shares
-      integer(ip) :: found(block_size + 1_ip), from, to, k, n, p
+      type(contact_shares_t), intent(inout) :: shares
 
       shares%n = 0_ip
+      shares%n_groups = bodies%n
+      if (bodies%pieces%most > 1_ip) then
+         call list_pieces(bodies, pairs, shares)
+      else
+         call list_bodies(bodies, pairs, shares)
+      end if
+      if (shares%n > 0_ip) call keep_several(shares)
+   end subroutine list_pairs
+
+   !> List pairs where every body has one piece: only those of free with fixed bodies may be several.
+   subroutine list_bodies(bodies, pairs, shares)
+      type(bodies_t), intent(in) :: bodies
+      type(pair_list_t), intent(in) :: pairs
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: found(block_size + 1_ip), from, to, k, n, p
+
+      ! Bodies that are not free here are fixed or belong to another rank.
       if (bodies%n - size(bodies%free, kind=ip) < 2_ip) return
-      call reserve_bodies(bodies%n, shares)
       from = 1_ip
       do while (from <= bodies%n)
          if (bodies%fixed(from)) exit
@@ -89,10 +114,7 @@ contains
          if (bodies%fixed(to)) exit
          to = to - 1_ip
       end do
-      if (bodies%pieces%most > 1_ip) then
-         from = bodies%pieces%first(from)
-         to = bodies%pieces%first(to + 1_ip) - 1_ip
-      end if
+      if (from >= to) return
       do p = 1_ip, pairs%n, block_size
          n = 0_ip
          do k = p, min(pairs%n, p + block_size - 1_ip)
@@ -100,54 +122,88 @@ contains
             n = n + merge(1_ip, 0_ip, (pairs%second(k) >= from .and. pairs%second(k) <= to) .or. &
                           (pairs%first(k) >= from .and. pairs%first(k) <= to))
          end do
-         if (n > 0_ip) call append(bodies%fixed, bodies%pieces, pairs, found(:n), shares)
+         call reserve_pairs(shares%n + n, shares)
+         do k = 1_ip, n
+            associate (i => pairs%first(found(k)), j => pairs%second(found(k)))
+               if (bodies%fixed(i) .neqv. bodies%fixed(j)) call append(found(k), merge(j, i, bodies%fixed(i)), shares)
+            end associate
+         end do
       end do
-      call keep_several(shares)
-   end subroutine list_pairs
+   end subroutine list_bodies
 
-   !> Append those of some pairs that have one fixed body.
-   subroutine append(fixed, pieces, pairs, found, shares)
-      logical, intent(in), contiguous :: fixed(:)
-      type(pieces_t), intent(in) :: pieces
+   !> List pairs where bodies have several pieces. Those with the pieces of one body as the first follow each other.
+   subroutine list_pieces(bodies, pairs, shares)
+      type(bodies_t), intent(in) :: bodies
       type(pair_list_t), intent(in) :: pairs
-      !> Indices of pairs, ascending
-      integer(ip), intent(in) :: found(:)
-      type(wall_shares_t), intent(inout) :: shares
-      integer(ip) :: k
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: before, i, j, k, p, upto
 
-      call reserve_pairs(shares%n + size(found, kind=ip), shares)
-      do k = 1_ip, size(found, kind=ip)
-         associate (i => pieces%body_of(pairs%first(found(k))), j => pieces%body_of(pairs%second(found(k))))
-            if (fixed(i) .eqv. fixed(j)) cycle
-            shares%n = shares%n + 1_ip
-            shares%pair(shares%n) = found(k)
-            shares%body(shares%n) = merge(j, i, fixed(i))
-         end associate
-         shares%count_of(shares%body(shares%n)) = shares%count_of(shares%body(shares%n)) + 1_ip
+      call reserve_bodies(bodies%n, shares)
+      upto = 0_ip
+      do while (upto < pairs%n)
+         p = upto + 1_ip
+         before = shares%n
+         i = bodies%pieces%body_of(pairs%first(p))
+         do while (upto < pairs%n)
+            if (pairs%first(upto + 1_ip) >= bodies%pieces%first(i + 1_ip)) exit
+            upto = upto + 1_ip
+         end do
+         call reserve_pairs(shares%n + upto - p + 1_ip, shares)
+         do k = p, upto
+            j = bodies%pieces%body_of(pairs%second(k))
+            if (bodies%fixed(i) .neqv. bodies%fixed(j)) then
+               call append(k, merge(j, i, bodies%fixed(i)), shares)
+            else if (upto > p) then
+               if (shares%group_with(j) == 0_ip) then
+                  shares%n_groups = shares%n_groups + 1_ip
+                  shares%group_with(j) = shares%n_groups
+               end if
+               call append(k, shares%group_with(j), shares)
+            end if
+         end do
+         do k = before + 1_ip, shares%n
+            shares%group_with(bodies%pieces%body_of(pairs%second(shares%pair(k)))) = 0_ip
+         end do
       end do
+   end subroutine list_pieces
+
+   !> Append a pair; there must be room.
+   pure subroutine append(pair, group, shares)
+      !> Index in the pair list
+      integer(ip), intent(in) :: pair
+      integer(ip), intent(in) :: group
+      type(contact_shares_t), intent(inout) :: shares
+
+      shares%n = shares%n + 1_ip
+      shares%pair(shares%n) = pair
+      shares%group(shares%n) = group
    end subroutine append
 
-   !> Keep the pairs of bodies with several of them, and clear the counts.
+   !> Keep the pairs of groups with several of them.
    subroutine keep_several(shares)
-      type(wall_shares_t), intent(inout) :: shares
+      type(contact_shares_t), intent(inout) :: shares
       integer(ip) :: k, n, n_all
 
+      call reserve_groups(shares%n_groups, shares)
       n_all = shares%n
+      do k = 1_ip, n_all
+         shares%count_of(shares%group(k)) = shares%count_of(shares%group(k)) + 1_ip
+      end do
       n = 0_ip
       do k = 1_ip, n_all
-         if (shares%count_of(shares%body(k)) < 2_ip) cycle
+         if (shares%count_of(shares%group(k)) < 2_ip) cycle
          n = n + 1_ip
          shares%pair(n) = shares%pair(k)
-         ! Exchanged, not overwritten: the counts of all bodies are still to be cleared.
-         if (n < k) call swap(shares%body(n), shares%body(k))
+         ! Exchanged, not overwritten: the counts of all groups are still to be cleared.
+         if (n < k) call swap(shares%group(n), shares%group(k))
       end do
       shares%n = n
       do k = 1_ip, n_all
-         shares%count_of(shares%body(k)) = 0_ip
+         shares%count_of(shares%group(k)) = 0_ip
       end do
    end subroutine keep_several
 
-   !> Exchange two slots.
+   !> Exchange two numbers.
    elemental subroutine swap(a, b)
       integer(ip), intent(inout) :: a, b
       integer(ip) :: c
@@ -166,7 +222,7 @@ contains
       !> First and last pair of the list
       integer(ip), intent(in) :: low, high
       !> The list; ratio and direction of these pairs are set
-      type(wall_shares_t), intent(inout) :: shares
+      type(contact_shares_t), intent(inout) :: shares
       type(contact_block_t) :: block
       integer(ip) :: first(block_size), second(block_size), c, k, n, next, tested
 
@@ -201,37 +257,37 @@ contains
 
    !> Compute the shares from the ratios and directions of all listed contacts.
    subroutine divide(shares)
-      type(wall_shares_t), intent(inout) :: shares
+      type(contact_shares_t), intent(inout) :: shares
       integer(ip) :: k
       real(wp) :: whole
 
       do k = 1_ip, shares%n
-         shares%tensor(:, shares%body(k)) = 0.0_wp
+         shares%tensor(:, shares%group(k)) = 0.0_wp
       end do
       do k = 1_ip, shares%n
-         associate (t => shares%tensor(:, shares%body(k)), n => shares%direction(:, k), r => shares%ratio(k))
+         associate (t => shares%tensor(:, shares%group(k)), n => shares%direction(:, k), r => shares%ratio(k))
             if (.not. r > 0.0_wp) cycle
             t = t + r*[n(1)*n(1), n(1)*n(2), n(2)*n(2)]
          end associate
-         shares%count_of(shares%body(k)) = shares%count_of(shares%body(k)) + 1_ip
+         shares%count_of(shares%group(k)) = shares%count_of(shares%group(k)) + 1_ip
       end do
       do k = 1_ip, shares%n
          shares%root(k) = 1.0_wp
-         associate (t => shares%tensor(:, shares%body(k)), n => shares%direction(:, k), r => shares%ratio(k))
+         associate (t => shares%tensor(:, shares%group(k)), n => shares%direction(:, k), r => shares%ratio(k))
             ! A contact alone has exactly 1, however many pairs the boxes make: no bit depends on the boxes.
-            if (.not. r > 0.0_wp .or. shares%count_of(shares%body(k)) < 2_ip) cycle
+            if (.not. r > 0.0_wp .or. shares%count_of(shares%group(k)) < 2_ip) cycle
             whole = n(1)*n(1)*t(1) + 2.0_wp*n(1)*n(2)*t(2) + n(2)*n(2)*t(3)
             shares%root(k) = sqrt(min(1.0_wp, r/whole))
          end associate
       end do
       do k = 1_ip, shares%n
-         shares%count_of(shares%body(k)) = 0_ip
+         shares%count_of(shares%group(k)) = 0_ip
       end do
    end subroutine divide
 
    !> Set the shares of a block of contacts: 1 for those that are not listed.
    pure subroutine set_shares(shares, cursor, block)
-      type(wall_shares_t), intent(in) :: shares
+      type(contact_shares_t), intent(in) :: shares
       !> Listed pairs up to this one are lower than all pairs of the blocks so far
       integer(ip), intent(inout) :: cursor
       !> Contacts in descending order of their pairs; `share_root` is set
@@ -255,20 +311,35 @@ contains
    !> Make room for n bodies.
    subroutine reserve_bodies(n, shares)
       integer(ip), intent(in) :: n
-      type(wall_shares_t), intent(inout) :: shares
+      type(contact_shares_t), intent(inout) :: shares
 
+      if (allocated(shares%group_with)) then
+         if (size(shares%group_with) >= n) return
+         deallocate (shares%group_with)
+      end if
+      allocate (shares%group_with(n), source=0_ip)
+   end subroutine reserve_bodies
+
+   !> Make room for n groups.
+   subroutine reserve_groups(n, shares)
+      integer(ip), intent(in) :: n
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: room
+
+      room = n
       if (allocated(shares%count_of)) then
          if (size(shares%count_of) >= n) return
+         room = max(2_ip*size(shares%count_of, kind=ip), n)
          deallocate (shares%count_of, shares%tensor)
       end if
-      allocate (shares%count_of(n), source=0_ip)
-      allocate (shares%tensor(3, n))
-   end subroutine reserve_bodies
+      allocate (shares%count_of(room), source=0_ip)
+      allocate (shares%tensor(3, room))
+   end subroutine reserve_groups
 
    !> Make room for n pairs.
    subroutine reserve_pairs(n, shares)
       integer(ip), intent(in) :: n
-      type(wall_shares_t), intent(inout) :: shares
+      type(contact_shares_t), intent(inout) :: shares
       integer(ip) :: room, k
 
       room = 0_ip
@@ -276,7 +347,7 @@ contains
       if (room >= n) return
       room = max(2_ip*room, n)
       call grow(shares%pair, shares%n, room)
-      call grow(shares%body, shares%n, room)
+      call grow(shares%group, shares%n, room)
       if (allocated(shares%root)) deallocate (shares%root, shares%ratio, shares%direction, shares%mine)
       allocate (shares%root(room), shares%ratio(room), shares%direction(2, room))
       allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
@@ -285,4 +356,4 @@ contains
       end do
    end subroutine reserve_pairs
 
-end module polydem_wall_shares
+end module polydem_contact_shares
