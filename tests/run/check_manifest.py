@@ -1,10 +1,10 @@
 """The manifest: damage is found, files of other origin stay, and `--force` always leaves one complete result.
 
-usage: check_manifest.py PROGRAM HOSTILE_SYSTEM [all]
+usage: check_manifest.py PROGRAM FAILING_CALLS [all]
 
-HOSTILE_SYSTEM is the library of hostile_system.c. With `all`, a run with `--force` is disturbed at every single call to
-the system, otherwise at all calls that set the old result aside and at some of the later ones; and every file stands in
-the way of every run, or is a link, otherwise a sample.
+FAILING_CALLS is the library of failing_calls.c. With `all`, a run with `--force` is disturbed at every single call that
+writes, otherwise at all calls that set the old result aside, and at the first and the last of each kind of the later
+ones; and every file stands in the way of every run, or is a link, otherwise a sample.
 """
 
 import os
@@ -348,24 +348,29 @@ def a_disturbed_force_leaves_a_whole_result(program, thoroughly):
     assert code == 0, message
     new_hash = output.splitlines()[-1]
     assert new_hash != program.hash
-    mark = os.path.abspath("mark")
-    for kind in ("fail", "kill"):
+    log, places = os.path.abspath("calls"), {"LD_PRELOAD": program.library, "POLYDEM_FAIL_FOLDER": os.getcwd()}
+
+    def disturbed(folder, **more):
+        """A run over a copy of the old result, and its calls."""
+        shutil.rmtree("disturbed.1", ignore_errors=True)
+        copy(folder)
+        write(f"{folder}/mine.txt", b"mine")
+        write(log, b"")
+        told = program.run(folder, "--force", *OTHER, **places, **more, POLYDEM_FAIL_LOG=log)
+        with open(log, encoding="utf-8") as file:
+            return told, [Call(0, *line.split(" ", 2)) for line in file.read().splitlines()]
+
+    (code, _, message), calls = disturbed("disturbed")
+    assert code == 0, message
+    aside = next(k for k, call in enumerate(calls) if (call.name, call.path) == ("rename", "disturbed.1"))
+    chosen = calls if thoroughly else calls[:aside + 1] + sample(calls[aside + 1:])
+    for kind in ("once", "kill"):
         ends = {"old": 0, "new": 0}
-        at = 0
-        while True:
-            # After the old result was set aside, every thirteenth call is enough.
-            at += 1 if thoroughly or ends["new"] < 10 else 13
-            shutil.rmtree("disturbed.1", ignore_errors=True)
-            folder = copy("disturbed")
-            write(f"{folder}/mine.txt", b"mine")
-            code, output, message = program.run(folder, "--force", *OTHER, LD_PRELOAD=program.library,
-                                                POLYDEM_HOSTILE=kind, POLYDEM_HOSTILE_AT=str(at),
-                                                POLYDEM_HOSTILE_PLACE="disturbed", POLYDEM_HOSTILE_MARK=mark)
-            if not os.path.exists(mark):
-                break
-            os.remove(mark)
-            assert kind == "fail" or code == -9, (at, code, message)
-            tried = (kind, at, code, output, message)
+        for at in chosen:
+            folder = "disturbed"
+            (code, output, message), _ = disturbed(folder, POLYDEM_FAIL_HOW=kind, POLYDEM_FAIL_CALL=str(at.number))
+            assert code == -9 if kind == "kill" else code != -9, (str(at), code, message)
+            tried = (kind, str(at), code, output, message)
             former = "disturbed.1" if os.path.exists("disturbed.1") else folder
             after = contents(former)
             after.pop("running.lock", None)
@@ -381,7 +386,7 @@ def a_disturbed_force_leaves_a_whole_result(program, thoroughly):
                 assert code == 0, (tried, message)
                 assert output.splitlines()[-1] == new_hash, (tried, output)
                 assert program.check(folder)[0] == 0, (tried, program.check(folder))
-        print(f"  {kind}: {sum(ends.values())} of {at - 1} calls, the old result was whole after {ends['old']}, the "
+        print(f"  {kind}: {len(chosen)} of {len(calls)} calls, the old result was whole after {ends['old']}, the "
               f"new one after {ends['new']}")
         assert ends["old"] >= 3 and ends["new"] > 15, ends
 
@@ -390,7 +395,7 @@ def main():
     program_path, library = (os.path.abspath(word) for word in sys.argv[1:3])
     thoroughly = sys.argv[3:] == ["all"]
     with tempfile.TemporaryDirectory() as work:
-        os.chdir(work)
+        os.chdir(os.path.realpath(work))
         program = Program(program_path, library)
         tests = (every_file_is_listed_with_its_checksum, flipped_bits_are_found,
                  missing_cut_and_exchanged_files_are_found, open_files_of_another_run_are_found,
@@ -407,6 +412,7 @@ def main():
 if __name__ == "__main__":
     sys.dont_write_bytecode = True
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "ranks"))
+    from check_writes import Call, sample
     from seals import seal_list
 
     main()

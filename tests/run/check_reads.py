@@ -1,7 +1,7 @@
 """Each call of a verb that reads, lists or looks for something fails once, or gives half of the data.
 
 usage: check_reads.py PROGRAM LIBRARY [--ranks R] [--full] [--verbs A,B] [--part K/N] [--how HOW] [--error NUMBER]
-                      [--seconds S] [--memory FILE]
+                      [--memory FILE]
 
 PROGRAM is the one without MPI, LIBRARY that of failing_calls.c. The verbs are those of VERBS; with --ranks those that
 several processes can do are tried, with R processes of the program that POLYDEM_MPI_PROGRAM names, and calls of each
@@ -13,13 +13,12 @@ call
 * all files that were there are as before, except those of a result that is continued or replaced;
 * a run can be continued, and ends with the hash of an undisturbed one; an old result is complete until then.
 
-Half of the data (--how short) must change nothing. By default a sample is tried, some calls of --continue and of other
-verbs, until S seconds are over (8); it depends on the programs only. --full and the others are those of
-check_writes.py.
+Half of the data (--how short) must change nothing. By default the first and the last call of each kind that no verb
+before has are tried, and all calls of verbs with few. --full and the other options are those of check_writes.py.
 """
 
+import copy
 import os
-import random
 import re
 import shutil
 import sys
@@ -29,12 +28,10 @@ import traceback
 from collections import Counter
 from pathlib import Path
 
-from check_writes import WAITING, Broken, Call, execute, hash_of, in_order, main, set_up
+from check_writes import WAITING, Broken, Call, attempts, execute, hash_of, main, sample, set_up
 
-#: Calls of a verb in a sample
-SAMPLE = 6
-#: When the test began [s]
-BEGAN = time.monotonic()
+#: So few calls of a verb are all tried
+FEW = 40
 OUTLINES = "".join(f"POLYGON ((0 {y}, 0.01 {y}, 0.01 {y + 0.01:.2f}, 0 {y + 0.01:.2f}, 0 {y}))\n"
                    for y in (0.0, 0.009, 0.018))
 #: What both scenes have: frames with contacts in several segments, a checkpoint after each step
@@ -101,8 +98,9 @@ class Case:
             self.insist(words)
         (self.data / "bench").rename(self.data / "measured")
         self.begin()
-        shutil.copytree(self.data, "template", symlinks=True)
-        self.before = bytes_of(Path("template"))
+        self.template = Path.cwd() / "template"
+        shutil.copytree(self.data, self.template, symlinks=True)
+        self.before = bytes_of(self.template)
 
     def begin(self):
         """An interrupted run: writing the last checkpoint failed."""
@@ -118,9 +116,10 @@ class Case:
     def call(self, words, ranks=None, **environment):
         """Do a verb; return exit code, standard output, standard error."""
         if words.split()[0] in PYTHON_VERBS:
-            return in_python(words.split(), environment)
+            return in_python(words.split(), environment, self.data.parent)
         command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
-        return execute([*command, *words.split()], {**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment})
+        return execute([*command, *words.split()], {**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment},
+                       self.data.parent)
 
     def insist(self, words, code=0, **environment):
         found, output, message = self.call(words, **environment)
@@ -130,9 +129,9 @@ class Case:
 
     def watched(self, verb, rank, **environment):
         """Do a verb in fresh files with the library in front; return what `call` does, and its calls."""
-        shutil.rmtree(self.data)
-        shutil.copytree("template", self.data, symlinks=True)
-        log = Path.cwd() / "calls"
+        shutil.rmtree(self.data, ignore_errors=True)
+        shutil.copytree(self.template, self.data, symlinks=True)
+        log = self.data.parent / "calls"
         log.unlink(missing_ok=True)
         told = self.call({**VERBS, **PYTHON_VERBS}[verb], self.ranks, LD_PRELOAD=self.library, POLYDEM_PATIENCE=WAITING,
                          POLYDEM_FAIL_KIND="reads", POLYDEM_FAIL_FOLDER=str(self.data), POLYDEM_FAIL_RANK=str(rank),
@@ -154,14 +153,17 @@ class Case:
         (said, files), (again, others) = outcomes
         self.whole[verb] = said if said == again else None, {name: text if others.get(name) == text else None
                                                              for name, text in files.items()}
-        seen = Counter()
-        for call in calls:
-            call.before = seen[call.name, call.path]
-            seen[call.name, call.path] += 1
         return calls
 
     def attempt(self, call):
         """Let a call fail; give what happened, in a word, and the seconds it took to end."""
+        with tempfile.TemporaryDirectory(dir=self.template.parent) as folder:
+            case = copy.copy(self)
+            case.data = Path(folder) / "data"
+            return case.attempt_here(call)
+
+    def attempt_here(self, call):
+        """Likewise in a folder in which nothing else happens."""
         began = time.monotonic()
         (code, output, message), calls = self.watched(call.verb, call.rank, POLYDEM_FAIL_CALL=str(call.number),
                                                       POLYDEM_FAIL_HOW=self.how, POLYDEM_FAIL_ERROR=str(self.error))
@@ -221,7 +223,7 @@ class Case:
         return self.whole[verb][0]
 
 
-def in_python(words, environment):
+def in_python(words, environment, folder):
     """Do a verb of Python in a child of this process, which has the library in front."""
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as message:
         child = os.fork()
@@ -231,6 +233,7 @@ def in_python(words, environment):
                 os.dup2(output.fileno(), 1)
                 os.dup2(message.fileno(), 2)
                 os.environ.update(environment)
+                os.chdir(folder)
                 code = polydem_post(words)
                 sys.stdout.flush()
                 sys.stderr.flush()
@@ -263,36 +266,26 @@ def outcome(output):
 
 
 def try_calls(case, options, memory):
-    """Let calls fail, as many as there is time for; give those that went wrong."""
+    """Let calls fail; give those that went wrong."""
     verbs = [*OF_RANKS] if options.ranks else [*VERBS, *PYTHON_VERBS]
     if options.verbs:
         verbs = options.verbs.split(",")
     part, parts = (int(word) for word in options.part.split("/"))
-    if not options.full:
-        random.Random(memory.key).shuffle(verbs)
-        verbs.sort(key=lambda verb: verb != "continue")
-    all_calls, broken, outcomes, tried = Counter(), [], Counter(), Counter()
-
-    def is_over():
-        return not options.full and tried and time.monotonic() - BEGAN > (options.seconds or 8.0)
-
+    all_calls, broken, outcomes, tried, known = Counter(), [], Counter(), Counter(), {True: set(), False: set()}
     for verb in verbs:
-        if is_over():
-            break
         calls = [call for rank in range(options.ranks or 1) for call in case.count(verb, rank)]
         all_calls[verb] = len(calls)
-        for call in in_order(calls, memory.key)[part - 1:None if options.full else SAMPLE:parts]:
-            if is_over():
-                break
-            point = (options.ranks, options.how, options.error, verb, call.rank, call.number)
-            tried[verb] += 1
-            try:
-                if point not in memory.passed:
-                    memory.keep(point, *case.attempt(call))
-                outcomes[memory.passed[point]["outcome"]] += 1
-            except Broken as problem:
+        kinds = known[verb in PYTHON_VERBS]
+        chosen = calls if options.full or len(calls) <= FEW else sample(calls, kinds)
+        kinds.update(call.kind() for call in calls)
+        points = {(options.ranks, options.how, options.error, verb, call.rank, call.number): call
+                  for call in chosen[part - 1::parts]}
+        tried[verb] = len(points)
+        for _, outcome, _ in attempts(case, points, options.ranks, memory):
+            if outcome:
+                outcomes[outcome] += 1
+            else:
                 broken.append(verb)
-                print(f"{verb}, {call}: {problem}", flush=True)
     print(f"calls that read: {dict(all_calls)}\ntried: {dict(tried)}; {dict(outcomes)}; wrong: {dict(Counter(broken))}")
     print(f"{sum(outcomes.values())} of {sum(tried.values())} calls passed ({options.how}, "
           f"{os.strerror(options.error)}); {len(broken)} did not")

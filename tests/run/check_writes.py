@@ -1,7 +1,6 @@
 """Each write call of a small run to its result folder fails once, and the run restarts afterwards.
 
-usage: check_writes.py PROGRAM LIBRARY [--ranks R] [--full] [--part K/N] [--how HOW] [--error NUMBER] [--seconds S]
-                       [--memory FILE]
+usage: check_writes.py PROGRAM LIBRARY [--ranks R] [--full] [--part K/N] [--how HOW] [--error NUMBER] [--memory FILE]
 
 PROGRAM is the one without MPI, LIBRARY that of failing_calls.c. With --ranks, the run in which a call fails is one of
 R processes of the program that POLYDEM_MPI_PROGRAM names, and it happens to each rank in turn; without that variable
@@ -12,9 +11,9 @@ the test is skipped (code 77). A run without a failure counts the calls. After a
 * every checkpoint with its final name is valid;
 * --continue ends with the hash, frames and contacts of an undisturbed run, and leaves no unfinished file.
 
-By default a sample is tried, of all kinds of calls and files in turn, until S seconds are over (8; 20 with ranks); it
-depends on the programs only. --full tries all calls, with --part the K-th of N parts of them. HOW is that of
-failing_calls.c, once by default. --memory names a file of calls that passed, which are not tried again by the same
+By default the first and the last call of each kind are tried (of ranks see `sample`), so that no verdict depends on how
+many calls the libraries of a machine make. --full tries all calls, with --part the K-th of N parts of them. HOW is that
+of failing_calls.c, once by default. --memory names a file of calls that passed, which are not tried again by the same
 programs.
 """
 
@@ -23,7 +22,6 @@ import contextlib
 import hashlib
 import json
 import os
-import random
 import re
 import shutil
 import signal
@@ -32,6 +30,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,8 +53,6 @@ STEPS, STEPS_OF_RANKS = 4, 3
 #: Calls whose failure may be of no consequence: nothing is lost by them that was not brought to disk before, or HDF5 or
 #: another rank does the same again. The result is compared all the same.
 HARMLESS = {"close", "unlink", "link", "symlink", "open", "fallocate", "ftruncate"}
-#: Calls that are tried first
-FIRST = {name: k for k, name in enumerate(("ftruncate", "pwrite", "fsync", "write", "rename"))}
 
 
 class Broken(Exception):
@@ -85,7 +82,7 @@ class Case:
 
     def watched(self, folder, rank, **environment):
         """Run it with the library in front, which counts or fails calls of a rank; give what `run` does and its log."""
-        log = self.work / "calls"
+        log = self.work / f"{folder}.calls"
         log.unlink(missing_ok=True)
         told = self.run(folder, ranks=self.ranks, LD_PRELOAD=self.library, POLYDEM_FAIL_FOLDER=str(self.work / folder),
                         POLYDEM_FAIL_RANK=str(rank), POLYDEM_FAIL_LOG=str(log), **environment)
@@ -94,21 +91,16 @@ class Case:
 
     def count(self, rank):
         """All calls of a rank in a run in which none fails."""
-        shutil.rmtree("failed", ignore_errors=True)
-        (code, output, message, _), calls = self.watched("failed", rank)
+        (code, output, message, _), calls = self.watched(f"counted_{rank}", rank)
         if code != 0 or hash_of(output) != self.hash or not calls:
             raise Broken(f"the run in which nothing fails: code {code}, {len(calls)} calls\n{message}")
-        seen = Counter()
-        for call in calls:
-            call.before = seen[call.name, call.path]
-            seen[call.name, call.path] += 1
         return calls
 
     def attempt(self, call):
         """Let a call fail, and go on; give what happened, in a word, and the seconds it took to end."""
-        shutil.rmtree("failed", ignore_errors=True)
+        folder = f"failed_{call.rank}_{call.number}"
         (code, output, message, seconds), calls = self.watched(
-            "failed", call.rank, POLYDEM_FAIL_CALL=str(call.number), POLYDEM_FAIL_HOW=self.how,
+            folder, call.rank, POLYDEM_FAIL_CALL=str(call.number), POLYDEM_FAIL_HOW=self.how,
             POLYDEM_FAIL_ERROR=str(self.error), POLYDEM_PATIENCE=WAITING)
         met = [other for other in calls if other.number == call.number]
         said = f"code {code}\n{message}"
@@ -117,30 +109,31 @@ class Case:
         if code == 0:
             if met and self.how != "short" and met[0].name not in HARMLESS:
                 raise Broken(f"it goes unnoticed: {said}")
-            if hash_of(output) != self.hash or frames("failed") != self.frames:
+            if hash_of(output) != self.hash or frames(folder) != self.frames:
                 raise Broken(f"the result is wrong, without a word: {said}")
         else:
             self.check_message(code, message, met[0])
-        for path in Path("failed").glob("checkpoint_?.h5"):
+        for path in Path(folder).glob("checkpoint_?.h5"):
             if not is_sealed(path):
                 raise Broken(f"{path} is damaged: {said}")
-        again, output, late = self.go_on()
+        again, output, late = self.go_on(folder)
         if again != 0:
             raise Broken(f"cannot be continued, code {again}:\n{late}\nafter {said}")
-        if hash_of(output) != self.hash or frames("failed") != self.frames:
+        if hash_of(output) != self.hash or frames(folder) != self.frames:
             raise Broken(f"the continued result is wrong, after {said}")
         # If nothing could be removed any more, the lock of the dead run stays where a finished result needs none.
-        rest = [name for name in os.listdir("failed") if name.endswith((".open", ".unfinished"))
+        rest = [name for name in os.listdir(folder) if name.endswith((".open", ".unfinished"))
                 or (name.endswith(".lock") and self.how != "on")]
         if rest and code != 0:
             raise Broken(f"{rest} are left after {said}")
+        shutil.rmtree(folder)
         # Runs differ by a few lines of the log.
         return ("told" if code != 0 else "harmless" if met else "not reached"), seconds
 
-    def go_on(self):
+    def go_on(self, folder):
         """Continue a run; mpirun may end a moment before its ranks."""
         for _ in range(100):
-            code, output, message, _ = self.run("failed", "--continue")
+            code, output, message, _ = self.run(folder, "--continue")
             if "another run (process" not in message:
                 break
             time.sleep(0.1)
@@ -148,7 +141,7 @@ class Case:
         if unsigned and self.how == "on":
             # The lock could neither be signed nor removed: the message says what to do.
             os.remove(unsigned.group(1))
-            code, output, message, _ = self.run("failed", "--continue")
+            code, output, message, _ = self.run(folder, "--continue")
         return code, output, message
 
     def check_message(self, code, message, call):
@@ -164,10 +157,10 @@ class Case:
             raise Broken(f"the message does not name the rank:\n{message}")
 
 
-def execute(command, environment):
-    """Run a command to its end; return exit code, standard output, standard error."""
+def execute(command, environment, folder=None):
+    """Run a command to its end in a folder; return exit code, standard output, standard error."""
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          errors="replace", env=environment, start_new_session=True) as process:
+                          errors="replace", env=environment, cwd=folder, start_new_session=True) as process:
         try:
             output, message = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired as late:
@@ -179,15 +172,14 @@ def execute(command, environment):
 
 
 class Call:
-    """A call of a rank that writes: number, name and path, and how often it was called so for this file before."""
+    """A call of a rank: number, name and path."""
 
     def __init__(self, rank, number, name, path):
         self.rank, self.number, self.name, self.path = int(rank), int(number), name, os.path.basename(path)
-        self.before = 0
 
     def kind(self):
-        """Rank, name, and kind of file; files are opened for several purposes"""
-        return self.rank, self.name, re.sub(r"\d+", "N", self.path), self.before if self.name == "open" else 0
+        """Rank, name, and kind of file"""
+        return self.rank, self.name, re.sub(r"\d+", "N", self.path)
 
     def __str__(self):
         return f"rank {self.rank}, call {self.number}: {self.name} of {self.path}"
@@ -206,17 +198,19 @@ def is_sealed(path):
     return path.read_bytes() == before
 
 
-def in_order(calls, seed):
-    """The k-th call of every kind before any k+1-th; what loses data comes first."""
-    chance = random.Random(seed)
-    kinds = {}
+def sample(calls, known=()):
+    """The first and the last call of each kind that is not known; of ranks the first of a kind that all of them have.
+
+    What one rank does alone, one process does, too.
+    """
+    first, last, ranks = {}, {}, {}
     for call in calls:
-        kinds.setdefault(call.kind(), []).append(call)
-    turns = []
-    for members in kinds.values():
-        chance.shuffle(members)
-        turns += [(turn, FIRST.get(call.name, len(FIRST)), chance.random(), call) for turn, call in enumerate(members)]
-    return [entry[-1] for entry in sorted(turns, key=lambda entry: entry[:-1])]
+        first.setdefault(call.kind(), call)
+        last[call.kind()] = call
+        ranks.setdefault(call.kind()[1:], set()).add(call.rank)
+    n = max((len(having) for having in ranks.values()), default=1)
+    chosen = [*first.values(), *([] if n > 1 else last.values())]
+    return [call for call in calls if call in chosen and call.kind() not in known and len(ranks[call.kind()[1:]]) == n]
 
 
 class Memory:
@@ -237,28 +231,37 @@ class Memory:
                 file.write(json.dumps(self.passed[point]) + "\n")
 
 
+def attempts(case, points, ranks, memory):
+    """Let each of these calls fail; give it with what happened and the seconds, or with nothing if that was wrong."""
+    # Ranks mostly wait for each other.
+    with ThreadPoolExecutor(4) as pool:
+        begun = {point: pool.submit(case.attempt, call) for point, call in points.items()
+                 if ranks and point not in memory.passed}
+        for point, call in points.items():
+            try:
+                if point not in memory.passed:
+                    memory.keep(point, *(begun[point].result() if ranks else case.attempt(call)))
+                yield call, memory.passed[point]["outcome"], memory.passed[point]["seconds"]
+            except Broken as problem:
+                print(f"{call}: {problem}", flush=True)
+                yield call, None, 0.0
+
+
 def try_calls(case, options, memory):
-    """Let calls fail, as many as there is time for; give those that went wrong."""
-    began = time.monotonic()
+    """Let calls fail; give those that went wrong."""
     calls = [call for rank in range(options.ranks or 1) for call in case.count(rank)]
     part, parts = (int(word) for word in options.part.split("/"))
     print(f"calls that write, by rank: {dict(Counter(call.rank for call in calls))}; "
           f"{len({call.kind() for call in calls})} kinds", flush=True)
-    seconds = options.seconds or (20.0 if options.ranks else 8.0)
     broken, outcomes, longest = [], Counter(), 0.0
-    for call in in_order(calls, memory.key)[part - 1::parts]:
-        point = (options.ranks, options.how, options.error, call.rank, call.number)
-        if point not in memory.passed:
-            if not options.full and time.monotonic() - began > seconds:
-                continue
-            try:
-                memory.keep(point, *case.attempt(call))
-            except Broken as problem:
-                broken.append(call)
-                print(f"{call}: {problem}", flush=True)
-                continue
-        outcomes[call.rank, memory.passed[point]["outcome"]] += 1
-        longest = max(longest, memory.passed[point]["seconds"])
+    points = {(options.ranks, options.how, options.error, call.rank, call.number): call
+              for call in (calls if options.full else sample(calls))[part - 1::parts]}
+    for call, outcome, seconds in attempts(case, points, options.ranks, memory):
+        if not outcome:
+            broken.append(call)
+            continue
+        outcomes[call.rank, outcome] += 1
+        longest = max(longest, seconds)
     for (rank, outcome), n in sorted(outcomes.items()):
         print(f"rank {rank}: {n} {outcome}")
     print(f"{sum(outcomes.values())} of {len(calls)} calls passed ({options.how}, error {options.error}), the longest "
@@ -277,7 +280,6 @@ def parse(words, purpose):
     parser.add_argument("--part", default="1/1")
     parser.add_argument("--how", choices=("once", "on", "short", "cut"), default="once")
     parser.add_argument("--error", type=int, default=5)
-    parser.add_argument("--seconds", type=float)
     parser.add_argument("--memory", type=os.path.abspath)
     return parser.parse_args(words)
 

@@ -2,48 +2,22 @@
  *
  *   locks   no file can be locked, as on some network file systems
  *   slow    each call to a file first waits a short time, sometimes 30 ms, so that processes interleave
- *
- * POLYDEM_KILL_AT=n kills the process before its n-th call to a file or folder whose path contains POLYDEM_KILL_IN. With
- * n = 0 the process ends with a line on standard error that gives the number of these calls.
  */
 #include "system_calls.h"
 
-/* Number of calls to the files in question */
-static long asked = 0;
-
-__attribute__((destructor)) static void tell(void)
+/* Before a call to a file: wait, if that is selected. */
+static void ask(void)
 {
-   const char *when = getenv("POLYDEM_KILL_AT");
+   struct timespec now;
 
-   if (when != NULL && strcmp(when, "0") == 0) fprintf(stderr, "asked %ld times\n", asked);
-}
-
-/* Before a call to this file: wait or kill, as selected. */
-static void ask(const char *path)
-{
-   const char *word = getenv("POLYDEM_KILL_IN"), *when = getenv("POLYDEM_KILL_AT");
-
-   if (does("slow")) {
-      struct timespec now;
-
-      clock_gettime(CLOCK_MONOTONIC, &now);
-      usleep(now.tv_nsec / 64 % 10 == 0 ? 30000 : now.tv_nsec / 64 % 500);
-   }
-   if (word == NULL || when == NULL || strstr(path, word) == NULL) return;
-   if (__atomic_add_fetch(&asked, 1, __ATOMIC_RELAXED) == atol(when)) kill(getpid(), SIGKILL);
-}
-
-static void ask_open(int file)
-{
-   char path[PATH_MAX];
-
-   path_of(file, path);
-   if (*path != '\0') ask(path);
+   if (!does("slow")) return;
+   clock_gettime(CLOCK_MONOTONIC, &now);
+   usleep(now.tv_nsec / 64 % 10 == 0 ? 30000 : now.tv_nsec / 64 % 500);
 }
 
 int flock(int file, int operation)
 {
-   ask_open(file);
+   ask();
    if (!does("locks")) return REAL(int, "flock", int, int)(file, operation);
    errno = ENOLCK;
    return -1;
@@ -56,7 +30,7 @@ int flock(int file, int operation)
       mode_t mode;                                             \
                                                                \
       TAKE_MODE(mode, flags);                                  \
-      ask(path);                                               \
+      ask();                                                   \
       return real(path, flags, mode);                          \
    }
 OPEN(open)
@@ -64,72 +38,72 @@ OPEN(open64)
 
 int creat(const char *path, mode_t mode)
 {
-   ask(path);
+   ask();
    return REAL(int, "creat", const char *, mode_t)(path, mode);
 }
 
 int mkdir(const char *path, mode_t mode)
 {
-   ask(path);
+   ask();
    return REAL(int, "mkdir", const char *, mode_t)(path, mode);
 }
 
 int unlink(const char *path)
 {
-   ask(path);
+   ask();
    return REAL(int, "unlink", const char *)(path);
 }
 
 int rename(const char *from, const char *to)
 {
-   ask(from);
+   ask();
    return REAL(int, "rename", const char *, const char *)(from, to);
 }
 
 int close(int file)
 {
-   ask_open(file);
+   ask();
    return REAL(int, "close", int)(file);
 }
 
 int fsync(int file)
 {
-   ask_open(file);
+   ask();
    return REAL(int, "fsync", int)(file);
 }
 
 int ftruncate64(int file, off64_t length)
 {
-   ask_open(file);
+   ask();
    return REAL(int, "ftruncate64", int, off64_t)(file, length);
 }
 
 int ftruncate(int file, off_t length)
 {
-   ask_open(file);
+   ask();
    return REAL(int, "ftruncate", int, off_t)(file, length);
 }
 
 int fallocate64(int file, int mode, off64_t from, off64_t length)
 {
-   ask_open(file);
+   ask();
    return REAL(int, "fallocate64", int, int, off64_t, off64_t)(file, mode, from, length);
 }
 
 ssize_t write(int file, const void *bytes, size_t length)
 {
-   ask_open(file);
+   ask();
    return REAL(ssize_t, "write", int, const void *, size_t)(file, bytes, length);
 }
 
 ssize_t pwrite64(int file, const void *bytes, size_t length, off64_t from)
 {
-   ask_open(file);
+   ask();
    return REAL(ssize_t, "pwrite64", int, const void *, size_t, off64_t)(file, bytes, length, from);
 }
 
 ssize_t pwrite(int file, const void *bytes, size_t length, off_t from)
 {
-   ask_open(file);
+   ask();
    return REAL(ssize_t, "pwrite", int, const void *, size_t, off_t)(file, bytes, length, from);
 }

@@ -6,7 +6,8 @@
  *   POLYDEM_FAIL_RANK     the rank of Open MPI that fails; all processes if it is not set
  *   POLYDEM_FAIL_CALL     number of the call that fails; none if it is not set
  *   POLYDEM_FAIL_HOW      once; on: all later calls fail, too; short: half of the data are written or read, which succeeds;
- *                         cut: likewise, and the next call fails
+ *                         cut: likewise, and the next call fails;
+ *                         kill: the process is killed before the call, or after it wrote half of the data
  *   POLYDEM_FAIL_ERROR    number of the error; EIO if it is not set
  *   POLYDEM_FAIL_LOG      a file to which each call adds a line: number, name, path
  *
@@ -30,6 +31,18 @@ static int is_inside(const char *path)
    return n > 0 && strncmp(path, folder, n) == 0 && (path[n] == '/' || path[n] == '\0');
 }
 
+static int kills(void)
+{
+   return strcmp(setting("POLYDEM_FAIL_HOW", "once"), "kill") == 0;
+}
+
+/* What a call that wrote half of its data returns */
+static ssize_t after_half(ssize_t written)
+{
+   if (kills()) kill(getpid(), SIGKILL);
+   return written;
+}
+
 /* Count a call to the folder: 0 to pass it on, 1 to fail, -1 for half of the data */
 static int count(const char *call, const char *path)
 {
@@ -38,7 +51,7 @@ static int count(const char *call, const char *path)
    const char *rank = setting("POLYDEM_FAIL_RANK", own), *how = setting("POLYDEM_FAIL_HOW", "once");
    const char *log = setting("POLYDEM_FAIL_LOG", "");
    int number, chosen = atoi(setting("POLYDEM_FAIL_CALL", "0")), before = errno;
-   int halves = strcmp(how, "short") == 0 || strcmp(how, "cut") == 0;
+   int halves = strcmp(how, "short") == 0 || strcmp(how, "cut") == 0 || (kills() && strstr(call, "write") != NULL);
 
    if (!is_inside(path) || strcmp(rank, own) != 0) return 0;
    number = __atomic_add_fetch(&calls, 1, __ATOMIC_RELAXED);
@@ -55,6 +68,7 @@ static int count(const char *call, const char *path)
    errno = before;
    if (chosen == 0 || number < chosen) return 0;
    if (halves && number == chosen) return strstr(call, "write") != NULL || strstr(call, "read") != NULL ? -1 : 0;
+   if (number == chosen && kills()) kill(getpid(), SIGKILL);
    if (number > chosen && strcmp(how, "on") != 0 && !(strcmp(how, "cut") == 0 && number == chosen + 1)) return 0;
    errno = atoi(setting("POLYDEM_FAIL_ERROR", "5"));
    return 1;
@@ -155,7 +169,8 @@ ssize_t write(int file, const void *bytes, size_t length)
    SYSTEM(ssize_t, real, int, const void *, size_t);
    int verdict = judge_file("write", file);
 
-   return verdict > 0 ? -1 : real(file, bytes, verdict < 0 && length > 1 ? length / 2 : length);
+   if (verdict < 0) return after_half(real(file, bytes, length > 1 ? length / 2 : length));
+   return verdict > 0 ? -1 : real(file, bytes, length);
 }
 
 #define PWRITE(name)                                                                                          \
@@ -163,7 +178,8 @@ ssize_t write(int file, const void *bytes, size_t length)
    {                                                                                                          \
       SYSTEM(ssize_t, real, int, const void *, size_t, off64_t);                                              \
       int verdict = judge_file("pwrite", file);                                                               \
-      return verdict > 0 ? -1 : real(file, bytes, verdict < 0 && length > 1 ? length / 2 : length, place);    \
+      if (verdict < 0) return after_half(real(file, bytes, length > 1 ? length / 2 : length, place));         \
+      return verdict > 0 ? -1 : real(file, bytes, length, place);                                             \
    }
 PWRITE(pwrite)
 PWRITE(pwrite64)
@@ -184,7 +200,7 @@ ssize_t writev(int file, const struct iovec *pieces, int n)
    struct iovec first = half(pieces, n);
 
    if (verdict > 0) return -1;
-   return verdict < 0 ? real(file, &first, 1) : real(file, pieces, n);
+   return verdict < 0 ? after_half(real(file, &first, 1)) : real(file, pieces, n);
 }
 
 #define PWRITEV(name)                                                               \
@@ -194,7 +210,7 @@ ssize_t writev(int file, const struct iovec *pieces, int n)
       int verdict = judge_file("pwritev", file);                                    \
       struct iovec first = half(pieces, n);                                         \
       if (verdict > 0) return -1;                                                   \
-      return verdict < 0 ? real(file, &first, 1, place) : real(file, pieces, n, place); \
+      return verdict < 0 ? after_half(real(file, &first, 1, place)) : real(file, pieces, n, place); \
    }
 PWRITEV(pwritev)
 PWRITEV(pwritev64)

@@ -9,13 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Optional, Union
 
-import h5py
 import numpy as np
 
 from .base.convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .base.new_file import NewHdf5, new_file
 from .base.polygons import FloatArray, IntArray, following, join, moments
-from .base.result_file import ResultError, cannot_read, cannot_write
+from .base.result_file import ResultError, cannot_write, reading_any
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 
 #: What becomes the origin of a bodies file: a point (x, y) [m], the centre of the polygons, or nothing
@@ -157,11 +156,8 @@ def _numbers(fixed: list[Any], count: int) -> set[int]:
 
 def origin_of(path: str | os.PathLike[str]) -> tuple[float, float]:
     """The point that became the origin of a bodies file [m]; (0, 0) if none did."""
-    try:
-        with h5py.File(path) as file:
-            return float(file.attrs.get("origin_x", 0.0)), float(file.attrs.get("origin_y", 0.0))
-    except OSError as error:
-        raise cannot_read(Path(path), error) from error
+    with reading_any(Path(path)) as file:
+        return float(file.attrs.get("origin_x", 0.0)), float(file.attrs.get("origin_y", 0.0))
 
 
 def pieces_of(path: str | os.PathLike[str]) -> tuple[int, int, float]:
@@ -169,12 +165,9 @@ def pieces_of(path: str | os.PathLike[str]) -> tuple[int, int, float]:
 
     The thickness is twice the smallest distance of an edge from the centroid.
     """
-    try:
-        with h5py.File(path) as file:
-            vertex, start = file["vertex"][:], file["vertex_start"][:]
-            piece = file["piece"][:] if "piece" in file else np.zeros(len(vertex), dtype=np.int64)
-    except OSError as error:
-        raise cannot_read(Path(path), error) from error
+    with reading_any(Path(path)) as file:
+        vertex, start = file["vertex"][:], file["vertex_start"][:]
+        piece = file["piece"][:] if "piece" in file else np.zeros(len(vertex), dtype=np.int64)
     count = np.maximum.reduceat(piece, start[:-1]) + 1
     several = np.repeat(count > 1, np.diff(start))
     if not several.any():

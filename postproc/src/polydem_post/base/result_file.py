@@ -117,11 +117,11 @@ def open_file(path: Path, known: dict[Path, tuple[int, ...]] | None = None) -> h
     identity = _identity(path)
     try:
         try:
-            file = _open_hdf5(path)
+            file = open_hdf5(path)
         except OSError:
             if present_path(path) == path:
                 raise
-            file = _open_hdf5(present_path(path))
+            file = open_hdf5(present_path(path))
     except OSError as error:
         raise cannot_read(path, error) from error
     try:
@@ -144,7 +144,7 @@ def open_file(path: Path, known: dict[Path, tuple[int, ...]] | None = None) -> h
 def is_of_run(path: Path) -> bool:
     """Whether a file is one of those that a run writes."""
     try:
-        with _open_hdf5(path) as file:
+        with open_hdf5(path) as file:
             return "schema_version" in file.attrs
     except UNREADABLE:
         return False
@@ -158,6 +158,16 @@ def reading(path: Path, known: dict[Path, tuple[int, ...]] | None = None):
             yield file
         except UNREADABLE as error:
             raise cannot_read(path, error) from error
+
+
+@contextmanager
+def reading_any(path: Path):
+    """An HDF5 file to read, which need not be of a run; whatever is wrong with it is told in a sentence."""
+    try:
+        with open_hdf5(path) as file:
+            yield file
+    except UNREADABLE as error:
+        raise cannot_read(path, error) from error
 
 
 def insist_on_own_data(path: Path, file: h5py.File) -> None:
@@ -218,7 +228,8 @@ def _identity(path: Path) -> tuple[int, ...] | None:
     return state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
 
 
-def _open_hdf5(path: Path) -> h5py.File:
+def open_hdf5(path: Path) -> h5py.File:
+    """Open any HDF5 file to read."""
     try:
         try:
             return h5py.File(path, "r", locking=False)
