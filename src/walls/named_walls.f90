@@ -181,7 +181,7 @@ contains
       gap = max(second(1) - first(2), first(1) - second(2))
    end function gap
 
-   !> Least and greatest coordinate of a wall along an axis [m]
+   !> Least and greatest coordinate of a wall along an axis, on its path through the copies of a periodic cell [m]
    pure function extent(self, w, axis, bodies)
       class(named_walls_t), intent(in) :: self
       !> Number of the wall
@@ -191,13 +191,15 @@ contains
       !> Bodies with turned vertices
       type(bodies_t), intent(in) :: bodies
       real(wp) :: extent(2)
+      real(wp) :: origin(2)
       integer(ip) :: k, v
 
       extent = [huge(1.0_wp), -huge(1.0_wp)]
       associate (slots => self%wall(w)%slots)
          do k = 1_ip, size(slots, kind=ip)
+            origin = path_of(bodies, slots(k))
             do v = bodies%pieces%vertex_start(slots(k)), bodies%pieces%vertex_start(slots(k) + 1_ip) - 1_ip
-               associate (place => bodies%position(axis, slots(k)) + bodies%pieces%turned(axis, v))
+               associate (place => origin(axis) + bodies%pieces%turned(axis, v))
                   extent(1) = min(extent(1), place)
                   extent(2) = max(extent(2), place)
                end associate

@@ -5,6 +5,7 @@
 !> exact, so their bits do not depend on ranks, threads and restarts.
 module polydem_wall_record
    use polydem_bodies, only: bodies_t
+   use polydem_bodies_in_cell, only: path_of
    use polydem_communicator, only: communicator_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t, n_words
@@ -80,7 +81,7 @@ contains
          associate (s => terms%slots(1, c))
             w = walls%wall_of(s)
             if (w == 0_ip) cycle
-            force = force_about(bodies%position(:, s), bodies, s, terms%term(:, c))
+            force = force_about(path_of(bodies, s), bodies, s, terms%term(:, c))
             call sums(1, w)%add(-weight*((force(1)*bodies%velocity(1, s) + force(2)*bodies%velocity(2, s)) &
                                          + force(3)*bodies%angular_velocity(s)))
             force = force_about(walls%wall(w)%pivot, bodies, s, terms%term(:, c))
@@ -91,7 +92,8 @@ contains
       end do
    end subroutine add_rates
 
-   !> Force of a contact on a fixed body along x and y [N/m], and its torque about a point [N]
+   !> Force of a contact on a fixed body along x and y [N/m], and its torque about a point [N]. The body is on its path
+   !> through the copies of a periodic cell.
    pure function force_about(point, bodies, s, term) result(force)
       !> The point, (2) [m]
       real(wp), intent(in) :: point(2)
@@ -100,11 +102,12 @@ contains
       integer(ip), intent(in) :: s
       !> Its term in the contact
       real(wp), intent(in) :: term(n_terms)
-      real(wp) :: force(3)
+      real(wp) :: force(3), arm(2)
 
+      arm = path_of(bodies, s) - point
       force(1) = term(sum_x(of_normal)) + term(sum_x(of_tangential))
       force(2) = term(sum_y(of_normal)) + term(sum_y(of_tangential))
-      force(3) = ((bodies%position(1, s) - point(1))*force(2) - (bodies%position(2, s) - point(2))*force(1)) &
+      force(3) = (arm(1)*force(2) - arm(2)*force(1)) &
                  + (term(sum_torque(of_normal)) + term(sum_torque(of_tangential)))
    end function force_about
 

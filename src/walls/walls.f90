@@ -68,7 +68,8 @@ contains
       call self%move(time, bodies)
    end subroutine yield
 
-   !> Move the bodies of the walls to their poses at a given time, and displace them by loads.
+   !> Move the bodies of the walls to their poses at a given time, and displace them by loads. Those that have left a
+   !> periodic cell return to it.
    subroutine move(self, time, bodies)
       class(walls_t), intent(in) :: self
       !> Simulated time [s]
@@ -79,9 +80,12 @@ contains
 
       do k = 1, size(self%driven)
          call move_wall(self%driven(k), time, bodies)
-         if (bodies%cell%is_periodic) call put_into_cell(bodies, self%driven(k)%slots)
       end do
       if (allocated(self%loads)) call carry_walls(self%loads, self%named, bodies)
+      if (.not. bodies%cell%is_periodic) return
+      do k = 1, size(self%driven)
+         call put_into_cell(bodies, self%driven(k)%slots)
+      end do
    end subroutine move
 
    !> Energies of all loads together at the end of a step, (`n_energies`) [J/m]
