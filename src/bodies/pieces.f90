@@ -50,6 +50,7 @@ module polydem_pieces
       procedure :: bodies_of
       procedure :: area_of
       procedure :: area_of_piece
+      procedure :: second_moment_of
       procedure :: allow
       procedure :: find_pieces
       procedure :: turn_pieces
@@ -194,6 +195,22 @@ contains
 
       area = signed_area(self%piece_polygon(p))
    end function area_of_piece
+
+   !> Polar second moment of area of a body about its centre: the sum of those of its pieces [m4]
+   pure real(wp) function second_moment_of(self, s) result(sum_of)
+      class(pieces_t), intent(in) :: self
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      real(wp) :: area, centroid(2), own
+      integer(ip) :: of_body(2), p
+
+      sum_of = 0.0_wp
+      of_body = self%pieces_of(s)
+      do p = of_body(1), of_body(2)
+         call mass_properties(self%piece_polygon(p), area, centroid, own)
+         sum_of = sum_of + (own + area*(centroid(1)*centroid(1) + centroid(2)*centroid(2)))
+      end do
+   end function second_moment_of
 
    !> Allow bodies of a number of pieces in the run, which the bodies here need not have.
    pure subroutine allow(self, most)

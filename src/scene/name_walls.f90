@@ -104,6 +104,7 @@ contains
             end do
             load%pivot = given%pivot
             load%mass = given%mass
+            load%has_weight = given%weight
             load%damping_ratio = given%damping_ratio
             load%start = given%start
             if (given%end > 0.0_wp) load%end = given%end

@@ -22,7 +22,7 @@ module polydem_simulation
    use polydem_loop_results, only: loop_results_t
    implicit none
    private
-   public :: simulation_t, relaxation_t, former_direction, time_of, acts_on_all, compute_balance
+   public :: simulation_t, relaxation_t, former_direction, time_of, present_gravity, acts_on_all, compute_balance
    public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: contacts, pairs that began, pairs that ended, contacts without direction
@@ -128,6 +128,14 @@ contains
 
       time_of = real(self%step, wp)*self%dt
    end function time_of
+
+   !> Acceleration of gravity in this step, with what changes in time (2) [m/s2]; the forces of the step are known
+   pure function present_gravity(self) result(gravity)
+      type(simulation_t), intent(in) :: self
+      real(wp) :: gravity(2)
+
+      gravity = self%settings%forces%gravity + self%loop%force_sums%acceleration
+   end function present_gravity
 
    !> Whether a step leaves nothing out for bodies that nothing touches: forces act on all bodies, or the border of a
    !> sheared cell, or a cell that yields; or bodies have several pieces, of which pairs are made

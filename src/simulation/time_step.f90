@@ -17,7 +17,7 @@ module polydem_time_step
    use polydem_pair_list, only: pair_list_t
    use polydem_predict, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
-   use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
+   use polydem_simulation, only: present_gravity, simulation_t, sum_began, sum_ended, time_of
    use polydem_strings, only: to_text
    use polydem_timers, only: block_clock_t, stage_boxes, stage_decomposition, stage_forces, stage_integrate, &
       stage_neighbours, stage_overlap
@@ -81,7 +81,7 @@ contains
              .or. allocated(self%bodies%cell%load)) call self%comm%all_reduce_error(error)
          if (allocated(error)) return
          if (allocated(self%walls%loads)) call self%walls%yield(self%comm, self%dt, time_of(self), &
-                                                                   self%bodies, self%loop%walls)
+                                                                   present_gravity(self), self%bodies, self%loop%walls)
          if (allocated(self%bodies%cell%load)) &
             call yield_cell(self%comm, self%dt, time_of(self), self%loop%virial, self%bodies%cell)
          call complete_step(self, error)

@@ -41,6 +41,8 @@ module polydem_named_walls
       procedure :: any_vanishes
       procedure :: serialize_gates
       procedure :: centre
+      procedure :: centre_of_area
+      procedure :: gyration_square
       procedure :: turn
       procedure :: gap
       procedure :: extent
@@ -153,6 +155,52 @@ contains
          if (size(slots) > 0) centre = centre/real(size(slots), wp)
       end associate
    end function centre
+
+   !> Centre of the area of a wall, at the present positions of its bodies; parts where they overlap count twice (2) [m]
+   pure function centre_of_area(self, w, bodies) result(centre)
+      class(named_walls_t), intent(in) :: self
+      !> Number of the wall
+      integer(ip), intent(in) :: w
+      type(bodies_t), intent(in) :: bodies
+      real(wp) :: centre(2), area, total
+      integer :: k
+
+      centre = 0.0_wp
+      total = 0.0_wp
+      associate (slots => self%wall(w)%slots)
+         do k = 1, size(slots)
+            area = bodies%pieces%area_of(slots(k))
+            ! Relative to the first body, so that the precision does not depend on the distance from the origin
+            centre = centre + area*(bodies%position(:, slots(k)) - bodies%position(:, slots(1)))
+            total = total + area
+         end do
+         if (size(slots) > 0) centre = bodies%position(:, slots(1)) + centre/total
+      end associate
+   end function centre_of_area
+
+   !> Mean square distance of the area of a wall from a point; parts where its bodies overlap count twice [m2]
+   pure real(wp) function gyration_square(self, w, point, bodies) result(square)
+      class(named_walls_t), intent(in) :: self
+      !> Number of the wall
+      integer(ip), intent(in) :: w
+      !> The point, (2) [m]
+      real(wp), intent(in) :: point(2)
+      type(bodies_t), intent(in) :: bodies
+      real(wp) :: arm(2), area, total
+      integer :: k
+
+      square = 0.0_wp
+      total = 0.0_wp
+      associate (slots => self%wall(w)%slots)
+         do k = 1, size(slots)
+            area = bodies%pieces%area_of(slots(k))
+            arm = bodies%position(:, slots(k)) - point
+            square = square + (bodies%pieces%second_moment_of(slots(k)) + area*(arm(1)*arm(1) + arm(2)*arm(2)))
+            total = total + area
+         end do
+         if (size(slots) > 0) square = square/total
+      end associate
+   end function gyration_square
 
    !> Angle by which a wall, or its first body, has turned [rad]
    pure real(wp) function turn(self, w, bodies)

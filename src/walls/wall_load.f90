@@ -5,6 +5,9 @@
 !> step, so it is stable for any coefficient. Before its start and from its end on, the wall is at rest where it is. The
 !> displacement comes on top of the motions of the wall.
 !>
+!> The mass of a wall is spread evenly over the area of its bodies, as they are at the start. If the wall has a weight,
+!> the gravity that acts on the bodies acts on this mass, too.
+!>
 !> The force of the contacts is an exact sum over all ranks. So all ranks compute the same bits.
 module polydem_wall_load
    use polydem_bodies, only: bodies_t
@@ -50,6 +53,10 @@ module polydem_wall_load
       real(wp) :: pivot(2) = 0.0_wp
       !> Mass [kg/m] or moment of inertia [kg m]; 0: from the free bodies
       real(wp) :: mass = 0.0_wp
+      !> Whether gravity acts on the wall
+      logical :: has_weight = .false.
+      !> The mass on which it acts; 0 without weight [kg/m]
+      real(wp) :: heavy = 0.0_wp
       !> Damping over the critical one, and the coefficient of the damping [kg/(m s)], of a turn [kg m/s]
       real(wp) :: damping_ratio = 1.0_wp, damping = 0.0_wp
       !> Times between which the wall yields [s]
@@ -62,7 +69,7 @@ module polydem_wall_load
       real(wp) :: place = 0.0_wp, speed = 0.0_wp, change = 0.0_wp
       !> Velocity in the middle of the step
       real(wp) :: half = 0.0_wp
-      !> Present force of the load and of the contacts along the direction; torques of a turn
+      !> Present force of the load, with that of gravity, and of the contacts along the direction; torques of a turn
       real(wp) :: applied = 0.0_wp, contact = 0.0_wp
       !> Number of contacts of the wall in the run
       integer(ip) :: n_contacts = 0_ip
@@ -83,16 +90,17 @@ contains
       real(wp), intent(in) :: usual
       !> Stiffness E of the contacts [N/m2]
       real(wp), intent(in) :: stiffness
-      real(wp) :: arm_square
+      real(wp) :: square
       integer :: k
 
       do k = 1, size(loads)
          associate (load => loads(k))
-            arm_square = 1.0_wp
-            if (load%direction == along_angle) arm_square = walls%greatest_arm(load%wall, load%pivot, bodies)**2
+            square = 1.0_wp
+            if (load%direction == along_angle) square = walls%gyration_square(load%wall, load%pivot, bodies)
             if (.not. load%mass > 0.0_wp) load%mass = usual
-            load%damping = load%damping_ratio*2.0_wp*sqrt(stiffness*load%mass)*arm_square
-            load%mass = load%mass*arm_square
+            if (load%has_weight) load%heavy = load%mass
+            load%damping = load%damping_ratio*2.0_wp*sqrt(stiffness*load%mass)*square
+            load%mass = load%mass*square
          end associate
       end do
    end subroutine set_masses
@@ -141,7 +149,7 @@ contains
    end subroutine carry_walls
 
    !> Find the forces at the end of the step, and the velocities there. Collective: no rank may be absent.
-   subroutine correct_loads(loads, comm, dt, time, walls, bodies, terms)
+   subroutine correct_loads(loads, comm, dt, time, gravity, walls, bodies, terms)
       !> All loads
       type(wall_load_t), intent(inout) :: loads(:)
       class(communicator_t), intent(inout) :: comm
@@ -149,6 +157,8 @@ contains
       real(wp), intent(in) :: dt
       !> Time at the end of the step [s]
       real(wp), intent(in) :: time
+      !> Acceleration of gravity at this time, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
       type(named_walls_t), intent(in) :: walls
       type(bodies_t), intent(in) :: bodies
       !> Contacts of this rank with fixed bodies
@@ -159,7 +169,7 @@ contains
       call find_contact_forces(loads, comm, walls, bodies, terms)
       do k = 1, size(loads)
          associate (load => loads(k))
-            load%applied = applied_force(load, walls, bodies, time)
+            load%applied = applied_force(load, walls, bodies, time, gravity)
             yields = time >= load%start .and. time < load%end
             if (.not. yields) then
                ! What stops a moving wall takes its kinetic energy, as a damping does.
@@ -213,13 +223,15 @@ contains
       end do
    end subroutine find_contact_forces
 
-   !> Force [N/m] or torque [N] of a load at a time; 0 while the wall does not yield
-   pure real(wp) function applied_force(load, walls, bodies, time) result(force)
+   !> Force [N/m] or torque [N] of a load and of gravity at a time; 0 while the wall does not yield
+   pure real(wp) function applied_force(load, walls, bodies, time, gravity) result(force)
       type(wall_load_t), intent(in) :: load
       type(named_walls_t), intent(in) :: walls
       !> Bodies with turned vertices
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: time
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
       real(wp) :: width, u
 
       force = 0.0_wp
@@ -227,10 +239,28 @@ contains
       width = load%width
       if (all(load%between > 0_ip)) width = max(0.0_wp, walls%gap(load%between, 3 - load%direction, bodies))
       force = load%force + load%stress*width
-      if (time - load%start >= load%ramp) return
-      u = (time - load%start)/load%ramp
-      force = force*(u*u*(3.0_wp - 2.0_wp*u))
+      if (time - load%start < load%ramp) then
+         u = (time - load%start)/load%ramp
+         force = force*(u*u*(3.0_wp - 2.0_wp*u))
+      end if
+      if (load%has_weight) force = force + weight_of(load, walls, bodies, gravity)
    end function applied_force
+
+   !> Force of gravity on a wall along the direction of a load [N/m], or its torque about the pivot [N]
+   pure real(wp) function weight_of(load, walls, bodies, gravity) result(weight)
+      type(wall_load_t), intent(in) :: load
+      type(named_walls_t), intent(in) :: walls
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in) :: gravity(2)
+      real(wp) :: arm(2)
+
+      if (load%direction == along_angle) then
+         arm = walls%centre_of_area(load%wall, bodies) - load%pivot
+         weight = load%heavy*(arm(1)*gravity(2) - arm(2)*gravity(1))
+      else
+         weight = load%heavy*gravity(load%direction)
+      end if
+   end function weight_of
 
    !> Energies of all loads together at the end of a step, (n_energies) [J/m]
    pure function energies_of_loads(loads, dt) result(energies)
@@ -280,7 +310,8 @@ contains
          energies = energies_of(loads(k), dt)
          call row%set(name//'.displacement', loads(k)%place, length, 'displacement of the wall by the load')
          call row%set(name//'.velocity', loads(k)%speed, length//'/s', 'its rate')
-         call row%set(name//'.load', loads(k)%applied, per, 'force or torque of the load along its direction')
+         call row%set(name//'.load', loads(k)%applied, per, 'force or torque of the load along its direction, with '// &
+                      'the weight')
          call row%set(name//'.contacts', loads(k)%contact, per, 'force or torque of the contacts on the wall')
          call row%set(name//'.work', energies(of_load), 'J/m', 'work of the load so far')
          call row%set(name//'.damping_work', energies(of_damping), 'J/m', 'work of the damping of the wall so far')

@@ -51,7 +51,7 @@ contains
    end subroutine predict
 
    !> Find the velocities of the walls that yield to loads from the contacts. Their places do not change. Collective.
-   subroutine yield(self, comm, dt, time, bodies, terms)
+   subroutine yield(self, comm, dt, time, gravity, bodies, terms)
       !> Walls with loads
       class(walls_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
@@ -59,12 +59,14 @@ contains
       real(wp), intent(in) :: dt
       !> Simulated time at the end of the step [s]
       real(wp), intent(in) :: time
+      !> Acceleration of gravity at this time, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
       !> Bodies; velocities and accelerations of those of the walls change
       type(bodies_t), intent(inout) :: bodies
       !> Contacts with fixed bodies
       type(wall_terms_t), intent(in) :: terms
 
-      call correct_loads(self%loads, comm, dt, time, self%named, bodies, terms)
+      call correct_loads(self%loads, comm, dt, time, gravity, self%named, bodies, terms)
       call self%move(time, bodies)
    end subroutine yield
 

@@ -176,6 +176,8 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           "grains.one.outline_choice": {"grains.one.outline": TWO_OUTLINES, "grains.one.outline_corners": "3, 4"},
           "grains.one.lloyd_steps": {"grains.one.gap": "1e-4"},
           "load.one.width": {"load.one.stress": "300"}, "load.one.stress": {"load.one.width": "0.1"},
+          "load.one.weight": {"load.one.direction": "y"},
+          **{f"load.one.{key}": {"load.one.torque": VARIED["load.one.torque"]} for key in ("direction", "pivot")},
           **{f"sample.{key}": {"output.series_interval": "1e-3"} for key in ("area", "low", "high")},
           "forces.shake": {"forces.shake_frequency": "40"}, "forces.shake_frequency": {"forces.shake": "5, 10"},
           "forces.rolling_damping": {"forces.rolling_friction": "0.2"},

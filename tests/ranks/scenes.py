@@ -137,7 +137,7 @@ SCENES = {
 &load name = 'squeeze' wall = 'right' direction = 'x' stress = -2e4 between = 'belt', 'lid' mass = 5 /
 &load name = 'press' wall = 'lid' direction = 'y' force = -3e3 mass = 3 damping_ratio = 0.1 start = 2e-3 end = 1e-2
    ramp = 1e-3 /
-&load name = 'twist' wall = 'flap' direction = 'angle' torque = 20 mass = 2 /
+&load name = 'twist' wall = 'flap' direction = 'angle' torque = 20 mass = 2 weight = .true. /
 &motion name = 'run' wall = 'belt' kind = 'conveyor' velocity = 1, 0 ramp = 3e-3 end = 9e-3 /
 &motion name = 'shake' wall = 'right' kind = 'oscillation' amplitude = 0, 1e-3 frequency = 100 /
 &forces gravity = 0, -40 stiffness = 1e6 /

@@ -28,6 +28,7 @@ contains
       do k = 1, size(settings%load)
          associate (instance => instances(index_of_instance(instances, 'load', settings%load(k)%name)))
             call check_width(settings%load(k), instance, error)
+            call check_weight(settings, settings%load(k), instance, error)
             call check_direction(settings, k, instance, error)
          end associate
       end do
@@ -62,13 +63,42 @@ contains
       end if
       if (load%mass > 0.0_wp .and. load%mass < 1.0e-12_wp) call blame(instance, 'mass', &
          'must be 0, or at least 1e-12', error)
-      if (load%direction /= 'angle' .and. .not. any([instance%values(row_of(instance, 'force'))%is_given, &
-         instance%values(row_of(instance, 'stress'))%is_given])) call blame(instance, 'force', 'and ''stress'' are '// &
-         'both missing; give one of them, for example force = -100. A wall that yields to the grains alone has '// &
-         'force = 0', error)
+      if (load%direction /= 'angle' .and. .not. load%weight .and. &
+          .not. any([instance%values(row_of(instance, 'force'))%is_given, &
+                     instance%values(row_of(instance, 'stress'))%is_given])) call blame(instance, 'force', &
+         'and ''stress'' are both missing; give one of them, for example force = -100. A wall that yields to the '// &
+         'grains alone has force = 0, one that lies on them weight = .true.', error)
+      if (load%direction == 'angle' .and. .not. load%weight .and. &
+          .not. instance%values(row_of(instance, 'torque'))%is_given) call blame(instance, 'torque', 'is missing; '// &
+         'give it, for example torque = 100. A wall that yields to the grains alone has torque = 0, one that '// &
+         'swings weight = .true.', error)
       if (load%end > 0.0_wp .and. load%end <= load%start) call blame(instance, 'end', 'must be behind ''start''', &
          error, 'start')
    end subroutine check_width
+
+   !> Check that gravity acts along the direction of a wall with a weight at some time.
+   pure subroutine check_weight(settings, load, instance, error)
+      type(settings_t), intent(in) :: settings
+      type(load_settings_t), intent(in) :: load
+      type(instance_t), intent(in) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: acts(2)
+      integer :: k
+
+      if (.not. load%weight) return
+      associate (forces => settings%forces)
+         acts = abs(forces%gravity) > 0.0_wp
+         do k = 1, size(settings%stage)
+            if (size(settings%stage(k)%gravity) == 2) acts = acts .or. abs(settings%stage(k)%gravity) > 0.0_wp
+         end do
+         if (abs(forces%turn_rate) > 0.0_wp) acts = any(acts)
+         acts = acts .or. abs(forces%shake) > 0.0_wp
+      end associate
+      if (load%direction == 'x' .and. acts(1) .or. load%direction == 'y' .and. acts(2)) return
+      if (load%direction == 'angle' .and. any(acts)) return
+      call blame(instance, 'weight', 'has no effect: gravity never acts along the direction of the load. Leave it '// &
+                 'out, or change ''gravity'' in &forces', error)
+   end subroutine check_weight
 
    !> Check that nothing else moves the wall along the direction of a load.
    pure subroutine check_direction(settings, l, instance, error)

@@ -241,7 +241,7 @@ contains
       slack = 0.5_wp*measures%diameter(2)
       do k = 1, size(simulation%walls%loads)
          associate (load => simulation%walls%loads(k))
-            if (load%direction == along_angle) cycle
+            if (load%direction == along_angle .or. load%has_weight) cycle
             extent = simulation%walls%named%extent(load%wall, load%direction, simulation%bodies)
             pull = load%force + load%stress
             if (.not. (pull > 0.0_wp .and. extent(1) > measures%free_extent(load%direction, 2) - slack) .and. &

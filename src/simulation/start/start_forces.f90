@@ -10,7 +10,7 @@ module polydem_start_forces
    use polydem_force_sums, only: force_sums_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: wp
-   use polydem_simulation, only: simulation_t, time_of
+   use polydem_simulation, only: present_gravity, simulation_t, time_of
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
    implicit none
@@ -33,7 +33,7 @@ contains
       call start_integration(self%settings%forces%gravity, self%loop%force_sums, self%bodies, self%motion%integrator, &
                              self%history)
       if (allocated(self%walls%loads)) call self%walls%yield(self%comm, 0.0_wp, time_of(self), &
-                                                                self%bodies, self%loop%walls)
+                                                                present_gravity(self), self%bodies, self%loop%walls)
       if (allocated(self%bodies%cell%load)) &
          call yield_cell(self%comm, 0.0_wp, time_of(self), self%loop%virial, self%bodies%cell)
       if (self%settings%output%series_interval > 0.0_wp) &
