@@ -12,13 +12,16 @@ import textwrap
 from collections import namedtuple
 from pathlib import Path
 
-Row = namedtuple("Row", "group key type count default unit allowed needs meaning")
+Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual")
 Group = namedtuple("Group", "meaning is_repeatable")
 #: Components: the Fortran type of one value and its value before it is filled
 TYPES = {"real": ("real(wp)", "0.0_wp"), "integer": ("integer(ip)", "0_ip"), "logical": ("logical", ".false.")}
 TEXTS = ("word", "path", "name")
 #: The row of the name of a repeatable group, from its key to what it is used with
 NAME_ROW = ("name", "name", 1, "required", "", "", "")
+#: A usual range with what may have been meant by a value outside it
+BOUND = r"(?:>=|>|<=|<|multiple_of) [-+.0-9e]+"
+USUAL = re.compile(rf"{BOUND}(?:(?:, | or | / ){BOUND})*: .+")
 #: Group of a bench; all other groups belong to a run
 BENCH = "bench"
 #: Groups that a recipe makes, which --expand prints
@@ -47,8 +50,9 @@ def read_table(text):
             lists[name] = with_lists(words.strip(), lists, number)
         else:
             fields = ["" if field.strip() == "-" else field.strip() for field in line.split(" | ")]
-            if len(fields) != len(Row._fields):
-                raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields)}")
+            if len(fields) not in (len(Row._fields) - 1, len(Row._fields)):
+                raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - 1}")
+            fields += [""] * (len(Row._fields) - len(fields))
             if not fields[3].isdigit():
                 raise TableError(f"line {number}: {fields[3]} is not a number of values")
             row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
@@ -68,6 +72,8 @@ def problem_of(row, groups, earlier):
         return "the row is not in its group"
     if row.type not in (*TYPES, *TEXTS) or (row.type == "logical" and row.count != 1):
         return f"there is no entry of type {row.type} with {row.count} values"
+    if row.usual and (row.type != "real" or not USUAL.fullmatch(row.usual)):
+        return f"{row.usual} is no usual range of {row.key}"
     same = [other for other in earlier if (other.group, other.key) == (row.group, row.key)]
     if any((other.type, other.count) != (row.type, row.count) for other in same):
         return f"{row.key} has another type in an earlier row"
@@ -119,11 +125,12 @@ def table_module(groups, rows):
         entries = []
         for row in rows:
             if row.group == group:
-                texts = [literal(field) for field in (row.default, row.unit, row.allowed, row.needs, row.meaning)]
+                texts = [literal(field) for field in (row.default, row.unit, row.allowed, row.needs, row.meaning,
+                                                      *(row.usual.split(": ", 1) if row.usual else ()))]
                 if row.default == "required":
                     texts[0] = "required"
                 entries.append(f"      entry_t('{row.group}', '{row.key}', '{row.type}', {row.count}, {texts[0]}, "
-                               f"{texts[1]}, &\n         {texts[2]}, &\n         {texts[3]}, &\n         {texts[4]})")
+                               f"{texts[1]}, &\n         " + ", &\n         ".join(texts[2:]) + ")")
         body += (f"   !> Group &{group}\n   type(entry_t), parameter :: {group}_entries(*) = [ &\n"
                  + ", &\n".join(entries) + "]\n\n")
     names = ", &\n      ".join(f"{group}_entries" for group in groups)
@@ -239,6 +246,8 @@ def manual(rows):
         allowed = ", ".join(row.allowed.split()) if row.type == "word" else row.allowed
         if row.type == "name":
             allowed = f"name of a &{row.allowed}" if row.allowed else "letters, digits, _"
+        if row.usual:
+            allowed += f"; usual: {row.usual.partition(': ')[0]}"
         key, _, words = row.needs.rpartition(":")
         used = ", ".join(words.split())
         cells = [f"&{row.group}", f"`{row.key}`", kind, row.unit, default, allowed,

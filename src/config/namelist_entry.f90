@@ -28,6 +28,11 @@ module polydem_namelist_entry
       character(len=80) :: needs
       !> Meaning in one sentence
       character(len=100) :: meaning
+      !> Usual values of a real number, beyond which there is a warning, as alternatives such as '<= 5 or > 90'; those
+      !> of further numbers behind a ' / '; blank: any. Zero is always usual
+      character(len=60) :: usual = ''
+      !> What may have been meant by an unusual value: the end of the warning
+      character(len=120) :: meant = ''
    end type entry_t
 
    !> Default of an entry that must be given if it is in use

@@ -22,6 +22,7 @@ module polydem_read_settings
    use polydem_resolve_entries, only: resolve_entries, resolved_text
    use polydem_settings, only: bench_settings_t, settings_t
    use polydem_text_file, only: read_text_file
+   use polydem_unusual_values, only: list_unusual
    implicit none
    private
    public :: read_settings, read_settings_text
@@ -103,6 +104,7 @@ contains
       origin%resolved = resolved_text(instances)
       origin%given = resolved_text(instances, given_only=.true.)
       call list_places(instances, origin)
+      call list_unusual(instances, origin%unusual)
    end subroutine read_values
 
    !> List where the entries were given.

@@ -1,5 +1,6 @@
 !> Where settings come from: the base of the types that `make_entries.py` makes of the table of entries.
 module polydem_source_locations
+   use polydem_strings, only: text_t
    implicit none
    private
    public :: source_locations_t, overrides_of, place_of
@@ -27,6 +28,8 @@ module polydem_source_locations
       character(len=:), allocatable :: given
       !> Where each entry was given, (any); not allocated in settings that no text gave
       type(entry_place_t), allocatable :: places(:)
+      !> A warning about each given value that is unusual, (any); not allocated in settings that no text gave
+      type(text_t), allocatable :: unusual(:)
    end type source_locations_t
 
 contains

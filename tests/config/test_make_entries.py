@@ -58,6 +58,14 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("call store_value(instance, 'height', reals=[settings%height])", made)
         self.assertNotIn("subroutine store_dog", made)
 
+    def test_a_usual_range_stands_in_the_table_and_in_the_manual(self):
+        table = read_table(GOOD.replace("| Height", "| Height | <= 3 or > 9: in mm?"))
+        self.assertIn("'Height', &\n         '<= 3 or > 9', &\n         'in mm?')", table_module(*table))
+        self.assertIn("'Name of the wall')", table_module(*table))
+        self.assertIn("| `height` | real | m | 1 | > 0; usual: <= 3 or > 9 | | Height |\n",
+                      manual(read_table(GOOD.replace("| m | - | - | Height",
+                                                     "| m | > 0 | - | Height | <= 3 or > 9: in mm?"))[1]))
+
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
                                   ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
@@ -66,6 +74,8 @@ class TestMakeEntries(unittest.TestCase):
                                   ("group bench", "group other", "line 14: the row is not in its group"),
                                   ("name | name | 1 | required", "name | name | 1 | -", "line 8: the first row of a"),
                                   ("dog | -", "walk | -", "friends of dog is the name of a group walk, which is not"),
+                                  ("| Height", "| Height | < three: in mm?", "line 12: < three: in mm. is no usual"),
+                                  ("| Height", "| Height | < 3", "line 12: < 3 is no usual range of height"),
                                   ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type")):
             with self.assertRaisesRegex(TableError, message):
                 read_table(GOOD.replace(old, new))

@@ -1,5 +1,5 @@
-!> Warnings about entries of the namelist that are probably a mistake: what never happens, stresses that the stiffness
-!> does not bear, walls that are pulled away, materials that nothing has, and runs that take too many steps.
+!> Warnings about entries of the namelist that are probably a mistake: unusual values, what never happens, stresses that
+!> the stiffness does not bear, walls that are pulled away, materials that nothing has, and runs that take too many steps.
 module polydem_entry_warnings
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_run, longest_stage, number_of_stage
@@ -32,6 +32,7 @@ contains
       !> The warnings so far
       type(text_t), allocatable, intent(inout) :: warnings(:)
 
+      if (allocated(simulation%settings%unusual)) warnings = [warnings, simulation%settings%unusual]
       if (.not. is_cut_short(simulation%settings)) then
          call warn_of_times(simulation%settings, warnings)
          call warn_of_intervals(simulation, warnings)

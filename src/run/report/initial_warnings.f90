@@ -3,7 +3,6 @@
 !> Each warning names a probable mistake of the input. The warnings cost no time in a step; the guards that a run
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
-   use polydem_elementary, only: hypotenuse
    use polydem_entry_warnings, only: add, warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
    use polydem_motion_check, only: shorter_step
@@ -28,8 +27,6 @@ module polydem_initial_warnings
    real(wp), parameter :: diameters(2) = [1.0e-6_wp, 1.0_wp]
    !> Range of densities of solids, including foams [kg/m3]
    real(wp), parameter :: densities(2) = [1.0_wp, 3.0e4_wp]
-   !> Gravity above that of any geotechnical centrifuge [m/s2]
-   real(wp), parameter :: strongest_gravity = 5.0e3_wp
    !> Greatest density that was probably meant in g/cm3: it is less than that of most foams [kg/m3]
    real(wp), parameter :: greatest_in_grams = 12.0_wp
    !> Ratio of the pressure of the weight to the stiffness above which bodies at rest overlap deeply, and one at which
@@ -93,12 +90,11 @@ contains
       end do
    end subroutine warn_of_tables
 
-   !> Warn of lengths, densities and gravity that are implausible in SI units.
+   !> Warn of lengths and densities that are implausible in SI units.
    subroutine warn_of_units(simulation, measures, warnings)
       type(simulation_t), intent(in) :: simulation
       type(scene_measures_t), intent(in) :: measures
       type(text_t), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: gravity
 
       associate (median => measures%diameter(2), density => measures%density)
          if (median > diameters(2) .or. median < diameters(1)) call add(warnings, &
@@ -117,12 +113,6 @@ contains
             'opening = '//to_text(scene%opening, 3)//' m is less than the diameter of the smallest grain, '// &
             to_text(measures%diameter(1), 3)//' m: hardly any grain flows out. Increase opening in &scene')
       end associate
-      associate (g => simulation%settings%forces%gravity)
-         gravity = hypotenuse(g(1), g(2))
-      end associate
-      if (gravity > strongest_gravity) call add(warnings, &
-         'gravity is in m/s2: '//to_text(gravity, 3)//' m/s2 is '//to_text(gravity/9.81_wp, 3)// &
-         ' times that of the Earth; check the units')
       if (measures%softness > softest) call add(warnings, &
          'the pressure under the full height of the free bodies is '//to_text(measures%softness, 3)// &
          ' of the least stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces or &material '// &
