@@ -74,7 +74,7 @@ def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | Non
     if not look.quantity:
         return None
     low, high = look.colour_range
-    values = np.concatenate([np.asarray(each.artist.get_array()) for each in grains])
+    values = np.concatenate([each.shown for each in grains])
     values = values[np.isfinite(values)]
     below, above = bool((values < low).any()), bool((values > high).any())
     arrows = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
@@ -101,6 +101,7 @@ def _finish(figure: Figure, axes, frames: list[Frame], look: SettledLook) -> Non
     for axis, frame, each in zip(axes, frames, grains):
         drawing.fit_outlines(each, frame, drawing.points_per_metre(axis))
         drawing.overlays(axis, frame, look)
+        drawing.CellOutline(axis, frame, look)
 
 
 def finish_axes(figure: Figure, axes, frame: Frame, look: SettledLook) -> None:
