@@ -215,7 +215,7 @@ def test_play_scrub_keys_and_curves(page, run):
     js(page, "const s = document.getElementById('scrub'); s.value = 3; s.dispatchEvent(new Event('input'))")
     assert js(page, "return viewer.frame") == 3
     assert "frame 3" in page.find_element("id", "time").text
-    Select(page.find_element("id", "colour")).select_by_visible_text("pressure [N/m2]")
+    Select(page.find_element("id", "colour")).select_by_visible_text("pressure [N/m²]")
     assert js(page, "return viewer.colour") == "pressure"
     curve = page.find_elements("css selector", "#curves canvas")[0]
     ActionChains(page).move_to_element_with_offset(curve, curve.size["width"] // 2 - 6, 0).click().perform()

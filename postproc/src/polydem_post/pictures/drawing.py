@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
@@ -39,6 +40,11 @@ COMPRESSED_COLOUR, PULLED_COLOUR = "#a01020", "#0072b2"
 
 #: How the border of a periodic cell is drawn, above the bodies and below what is laid over them
 CELL_OUTLINE = {"color": "black", "linewidth": 0.6, "linestyle": (0.0, (4.0, 2.0)), "zorder": 2.5}
+
+#: Colours of materials 0 to 9, as light as differ in grey too, the first ones most
+MATERIAL_COLOURS = ("#e0be97", "#044786", "#eed453", "#0f9e7d", "#bb3939", "#f59b5a", "#571c53", "#cff3b4", "#0f82b1",
+                    "#de7fb4")
+matplotlib.colormaps.register(ListedColormap(MATERIAL_COLOURS, "materials"), force=True)
 
 #: Width of the line of the largest force as a share of the median equivalent diameter of the free bodies, and greatest
 #: width [pt]
@@ -72,6 +78,10 @@ class Look:
     greatest_force: float | None = None
     #: Pressure that has the longest cross [N/m2]; found from the frames if absent
     greatest_stress: float | None = None
+    #: Whether each frame has its time as a title
+    title: bool = True
+    #: Whether a bar of a round length stands in place of the axes
+    scale_bar: bool = False
     #: Grid of the quadtree
     grid: CellGrid | None = field(default=None, compare=False)
 
@@ -144,9 +154,10 @@ class _Extent:
                               f"are at {', '.join(spans)}")
         if colour_range is None:
             colour_range = range_of(look.quantity, _joined(self.values)) if look.quantity else (0.0, 1.0)
-        return SettledLook(look.colour, look.show, limits, colour_range, look.colours,
-                           look.greatest_force or _covered(self.forces),
-                           look.greatest_stress or _covered(self.stresses), look.grid)
+        found = {"limits": limits, "colour_range": colour_range,
+                 "greatest_force": look.greatest_force or _covered(self.forces),
+                 "greatest_stress": look.greatest_stress or _covered(self.stresses)}
+        return SettledLook(**{**vars(look), **found})
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -165,11 +176,16 @@ def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLoo
         named = [name for name in look.show if name in NEED_CONTACTS] or [look.colour]
         raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
                           "output.contacts = .true.")
-    extent = _Extent(trajectory[0])
-    for frame in trajectory[numbers]:
+    return settle_frames(trajectory[0], trajectory[numbers], look)
+
+
+def settle_frames(start: Frame, frames: Iterable[Frame], look: Look) -> SettledLook:
+    """The same from the first frame of a run and those that are shown."""
+    extent = _Extent(start)
+    for frame in frames:
         extent.add(frame, look)
     if "cells" in look.show:
-        look = replace(look, grid=cell_grid(trajectory[0]))
+        look = replace(look, grid=cell_grid(start))
     return extent.settle(look)
 
 
@@ -424,7 +440,7 @@ def legend_of(frame: Frame, look: SettledLook, scale: float) -> list[Line2D]:
                       for share, more in ((1.0, " or more"), (0.3, ""))]
         elif name == "stress" and look.greatest_stress:
             lines += [Line2D([], [], color=colour, linewidth=1.2, label=label) for colour, label in (
-                (COMPRESSED_COLOUR, f"compression {look.greatest_stress:.2g} N/m2 or more"),
+                (COMPRESSED_COLOUR, f"compression {look.greatest_stress:.2g} N/m² or more"),
                 (PULLED_COLOUR, "tension"))]
         elif name == "contacts":
             lines.append(Line2D([], [], color=CONTACT_COLOUR, marker="x", linestyle="none", label=OVERLAYS[name]))

@@ -23,7 +23,7 @@ from ..read.trajectory import Trajectory
 from . import drawing
 from .drawing import Look, SettledLook
 from .film_files import write_gif, write_mp4
-from .plot import add_scale, finish_axes, prepare
+from .plot import add_scale, add_scale_bar, finish_axes, prepare
 
 #: Ends of the names of films, and what writes them
 FORMS = {".mp4": write_mp4, ".gif": write_gif}
@@ -60,6 +60,8 @@ class Painter:
         self._axis = self._figure.subplots()
         frame = trajectory[first]
         prepare(self._axis, film.look, self._title(frame.time))
+        if film.look.scale_bar:
+            add_scale_bar(self._axis, film.look)
         walls, grains = drawing.draw_bodies(self._axis, frame, film.look)
         outline = drawing.CellOutline(self._axis, frame, film.look)
         self._moving: list[drawing.Bodies | drawing.CellOutline] = [walls, grains, outline]

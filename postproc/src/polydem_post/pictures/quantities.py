@@ -18,7 +18,7 @@ COVERED = 99.5
 NARROWEST = 1e-9
 
 #: What a range spans at least, so that what is at rest looks so: by unit
-LEAST = {"m/s": 1e-6, "rad/s": 1e-4, "N/m": 1e-6, "N/m2": 1e-3}
+LEAST = {"m/s": 1e-6, "rad/s": 1e-4, "N/m": 1e-6, "N/m²": 1e-3}
 
 
 @dataclass(frozen=True)
@@ -128,15 +128,15 @@ QUANTITIES = {
     "size": Quantity("equivalent diameter", "m", lambda f: f.equivalent_diameter, "cividis", "data",
                      constant=True),
     "mass": Quantity("mass per depth", "kg/m", lambda f: _given(f.mass), "cividis", "data", constant=True),
-    "density": Quantity("density", "kg/m3", lambda f: _given(f.mass) / f.area, "cividis", "data", constant=True),
-    "material": Quantity("material", "", lambda f: f.material.astype(float), "tab10", "class", constant=True),
+    "density": Quantity("density", "kg/m³", lambda f: _given(f.mass) / f.area, "cividis", "data", constant=True),
+    "material": Quantity("material", "", lambda f: f.material.astype(float), "materials", "class", constant=True),
     "force": Quantity("resultant of the contact forces", "N/m", lambda f: _length(f.force), "YlOrRd",
                       needs_contacts=True),
     "load": Quantity("sum of the contact forces' magnitudes", "N/m", load, "YlOrRd", needs_contacts=True),
     "coordination": Quantity("number of contacts", "", lambda f: f.coordination.astype(float),
                              needs_contacts=True),
-    "pressure": Quantity("pressure", "N/m2", pressure, "YlOrRd", needs_contacts=True),
-    "shear_stress": Quantity("shear stress", "N/m2", shear_stress, "YlOrRd", needs_contacts=True),
+    "pressure": Quantity("pressure", "N/m²", pressure, "YlOrRd", needs_contacts=True),
+    "shear_stress": Quantity("shear stress", "N/m²", shear_stress, "YlOrRd", needs_contacts=True),
     "id": Quantity("id modulo 20", "", lambda f: np.mod(f.id, 20).astype(float), "tab20", "class",
                    constant=True),
 }
