@@ -68,7 +68,7 @@ def test_equations_become_mathml(tmp_path):
 
 
 def test_remarks_on_tests_are_small_print_behind_their_block(tmp_path):
-    root = small_root(tmp_path / "root", "# T\n\n<!-- tests do not run this: a day on one core -->\n```sh\nx\n```\n")
+    root = small_root(tmp_path / "root", "# T\n\n```sh\nx\n```\n<!-- tests do not run this: a day on one core -->\n")
     stage(root, tmp_path / "pages")
     text = (tmp_path / "pages" / "README.md").read_text(encoding="utf-8")
     assert text.index("```sh") < text.index("The tests do not run this: a day on one core")
