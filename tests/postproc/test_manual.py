@@ -48,6 +48,16 @@ def test_every_page_is_in_the_site_and_in_the_search(site):
     assert {str(html_of(page, site).relative_to(site)) for page in PAGES} <= found
 
 
+def test_the_search_finds_words_of_names(site):
+    """Finds that `inertial_number` is one word, which a search for its words does not meet."""
+    index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
+    plain = {entry["location"]: re.sub(r"<[^>]*>|[^\w\s-]", " ", entry["text"]).lower() for entry in index["docs"]}
+    found = {location for location, text in plain.items()
+             if {"inertial", "number"} <= set(re.split(index["config"]["separator"], text))}
+    assert {"inputs/walls.html#series", "inputs/glossary.html", "inputs/cells.html#a-cell-that-obeys-a-stress",
+            "postproc/analysis.html"} <= found
+
+
 def test_the_site_fetches_nothing(site):
     assert [page for page in site.rglob("*.html") if FETCHED.search(page.read_text(encoding="utf-8"))] == []
 
