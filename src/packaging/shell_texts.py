@@ -1,9 +1,10 @@
 """Tab completion and man page, made from the help texts of the verbs.
 
-usage: shell_texts.py bash|zsh|fish|man VERSION HELP.txt...
+usage: shell_texts.py bash|zsh|fish|man VERSION ENTRIES.txt HELP.txt...
 
 A help text has the call of its verb in its first line, the meaning in its second one, and its options below. What a
-help text names is completed, and nothing else, so completion and man page never differ from the help.
+help text names is completed, so completion and man page never differ from the help: verbs, options, and the values of
+an option that are listed below it. Entries of the namelist come from the table of all entries.
 """
 
 import os
@@ -14,6 +15,10 @@ from pathlib import Path
 
 #: An option at the start of a line: its names, its value, its meaning
 OPTION = re.compile(r"  (-[-\w]+)(?:, (--[-\w]+))?(?: ([A-Z][^ ]*))?(?:  +| )(\S.*)?$")
+#: A value of an option, or several, at the start of a line below it, and what follows them
+VALUES = re.compile(r" {28}(\w+(?:, \w+)*)(?:  |$)")
+#: What stands for an entry of the namelist, and for the name of a group that may be there several times
+ENTRY, NAME = "GROUP.KEY=VALUE", "NAME"
 #: Words of a call that are chosen, as in sweep make|run|collect
 CHOICE = re.compile(r"^[\w-]+(?:\|[\w-]+)+$")
 
@@ -46,25 +51,57 @@ class Verb:
     options: tuple
     #: Words of which one follows the verb
     choices: tuple
+    #: What stands for the value of an option -> the values that are listed
+    values: dict
 
 
 def read_verb(path):
     """The verb that a help text describes."""
     call, meaning, *lines = Path(path).read_text(encoding="utf-8").splitlines()
-    options = {}
+    options, values, kind = {}, {}, ""
     for line in lines:
-        match = OPTION.match(line)
+        match, listed = OPTION.match(line), VALUES.match(line)
         if match:
+            kind = match[3] or ""
             for name in filter(None, match.groups()[:2]):
                 options.setdefault(name, (name, match[3] or "", match[4] or ""))
+        elif listed and kind.isalpha():
+            values.setdefault(kind, []).extend(listed[1].split(", "))
     words = call.split()
     choices = next((tuple(word.split("|")) for word in words[1:] if CHOICE.match(word)), ())
-    return Verb(words[0], call, meaning, tuple(lines), tuple(options.values()), choices)
+    return Verb(words[0], call, meaning, tuple(lines), tuple(options.values()), choices, values)
 
 
-def bash_text(verbs):
+def read_entries(path):
+    """Entries of the namelist as `--set` takes them; the name of a group that may be there several times is NAME."""
+    several, found = set(), {}
+    for line in Path(path).read_text(encoding="utf-8").splitlines():
+        group = re.match(r"group (\w+)( \*)?:", line)
+        fields = [field.strip() for field in line.split("|")]
+        if group and group[2]:
+            several.add(group[1])
+        elif len(fields) == 9 and not line.startswith("#"):
+            found[f"{fields[0]}.{NAME}.{fields[1]}=" if fields[0] in several else f"{fields[0]}.{fields[1]}="] = None
+    return tuple(found)
+
+
+def values_of(verbs, entries):
+    """What stands for the value of an option -> its values, of any verb."""
+    listed = {kind: values for verb in verbs for kind, values in verb.values.items()}
+    return {**listed, ENTRY: entries}
+
+
+def plain(entries):
+    """Entries of the groups that have no name."""
+    return [entry for entry in entries if f".{NAME}." not in entry]
+
+
+def bash_text(verbs, entries):
     """Completion for bash."""
-    cases = []
+    cases, known = [], values_of(verbs, entries)
+    kinds = {name: value for verb in verbs for name, value, _ in verb.options if value in known}
+    sorts = [f"    {' | '.join(name for name in kinds if kinds[name] == kind)}) values='{' '.join(values)}' ;;"
+             for kind, values in known.items()]
     for verb in verbs:
         values = [name for name, value, _ in verb.options if value]
         cases.append(f"    {verb.name})\n      options='{' '.join(name for name, _, _ in verb.options)}'\n"
@@ -73,29 +110,48 @@ def bash_text(verbs):
     return "\n".join([
         "# Tab completion of polydem for bash", "_polydem() {",
         "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} options='' valued='' choices=''",
+        "  local values='' name",
         "  COMPREPLY=()", "  if [ \"$COMP_CWORD\" -eq 1 ]; then",
         f"    mapfile -t COMPREPLY < <(compgen -W '{names}' -- \"$word\")", "    return", "  fi",
         "  case ${COMP_WORDS[1]} in", *cases, "    help | --help)",
         f"      choices='{' '.join(verb.name for verb in verbs)}'", "      ;;", "  esac",
-        "  [[ \" $valued \" != *\" $before \"* ]] || return 0", "  if [[ $word == -* ]]; then",
+        "  if [[ \" $valued \" == *\" $before \"* ]]; then", "    case $before in", *sorts, "    esac",
+        "    # An entry of a group that may be there several times follows the name that is typed.",
+        "    name=${word#*.}",
+        "    [[ $word != *.*.* ]] || values=${values//.NAME./.${name%%.*}.}",
+        "    mapfile -t COMPREPLY < <(compgen -W \"$values\" -X '*.NAME.*' -- \"$word\")",
+        "    [[ ${COMPREPLY[0]-} != *= ]] || compopt -o nospace 2> /dev/null || true",
+        "    return 0", "  fi", "  if [[ $word == -* ]]; then",
         "    mapfile -t COMPREPLY < <(compgen -W \"$options\" -- \"$word\")",
         "  elif [ \"$COMP_CWORD\" -eq 2 ] && [ -n \"$choices\" ]; then",
         "    mapfile -t COMPREPLY < <(compgen -W \"$choices\" -- \"$word\")", "  fi", "}",
         "# Where nothing is suggested, files are.", "complete -o default -F _polydem polydem", ""])
 
 
-def zsh_text(verbs):
+def zsh_text(verbs, entries):
     """Completion for zsh."""
+    known = values_of(verbs, entries)
+
+    def action(value):
+        """How a value is completed."""
+        if value == ENTRY:
+            return "_polydem_entries"
+        return f"({' '.join(known[value])})" if value in known else "_files"
+
     def quoted(text):
         return re.sub(r"([\[\]:\\])", r"\\\1", text).replace("'", "'\\''")
 
-    lines = ["#compdef polydem", "# Tab completion of polydem for zsh", "_polydem() {", "  local -a verbs", "  verbs=("]
+    lines = ["#compdef polydem", "# Tab completion of polydem for zsh", "_polydem_entries() {",
+             "  # An entry of a group that may be there several times follows the name that is typed.",
+             f"  local -a entries=({' '.join(entries)})", "  local name=${PREFIX#*.}",
+             "  [[ $PREFIX != *.*.* ]] || entries=(${entries/.NAME./.${name%%.*}.})",
+             "  compadd -S '' -- ${entries:#*.NAME.*}", "}", "_polydem() {", "  local -a verbs", "  verbs=("]
     lines += [f"    '{verb.name}:{quoted(verb.meaning)}'" for verb in verbs]
     lines += ["    'help:print the options of a verb'", "  )", "  if (( CURRENT == 2 )); then",
               "    _describe 'verb' verbs", "    return", "  fi", "  local verb=$words[2]", "  shift words",
               "  (( CURRENT -= 1 ))", "  case $verb in"]
     for verb in verbs:
-        specs = [f"'*{name}[{quoted(meaning)}]{f':{quoted(value)}:_files' if value else ''}'"
+        specs = [f"'*{name}[{quoted(meaning)}]{f':{quoted(value)}:{action(value)}' if value else ''}'"
                  for name, value, meaning in verb.options]
         first = f"'1:step:({' '.join(verb.choices)})' " if verb.choices else ""
         lines.append(f"    {verb.name}) _arguments {' '.join(specs)} {first}'*:file:_files' ;;")
@@ -104,10 +160,16 @@ def zsh_text(verbs):
     return "\n".join(lines)
 
 
-def fish_text(verbs):
+def fish_text(verbs, entries):
     """Completion for fish."""
+    known = values_of(verbs, plain(entries))
+
     def quoted(text):
         return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+    def taken(value):
+        """How a value is completed."""
+        return f" -x -a '{' '.join(known[value])}'" if value in known else " -r" if value else ""
 
     lines = ["# Tab completion of polydem for fish"]
     for verb in verbs:
@@ -117,7 +179,7 @@ def fish_text(verbs):
         for name, value, meaning in verb.options:
             short = "-s" if len(name) == 2 else "-o"
             form = f"-l {name[2:]}" if name.startswith("--") else f"{short} {name[1:]}"
-            lines.append(f"complete -c polydem {seen} {form}{' -r' if value else ''} -d {quoted(meaning)}")
+            lines.append(f"complete -c polydem {seen} {form}{taken(value)} -d {quoted(meaning)}")
     return "\n".join([*lines, ""])
 
 
@@ -146,13 +208,13 @@ def man_text(verbs, version):
 
 def main():
     """Print the text that the command line asks for."""
-    kind, version, *files = sys.argv[1:]
-    verbs = [read_verb(path) for path in files]
-    texts = {"bash": bash_text, "zsh": zsh_text, "fish": fish_text, "man": lambda found: man_text(found, version)}
+    kind, version, table, *files = sys.argv[1:]
+    verbs, entries = [read_verb(path) for path in files], read_entries(table)
+    texts = {"bash": bash_text, "zsh": zsh_text, "fish": fish_text, "man": lambda found, _: man_text(found, version)}
     if kind not in texts:
         sys.exit(f"there is no text {kind}, but {', '.join(texts)}")
     try:
-        sys.stdout.write(texts[kind](verbs))
+        sys.stdout.write(texts[kind](verbs, entries))
         sys.stdout.flush()
     except BrokenPipeError:
         give_up(141)  # as a shell says of a program that nobody reads any more

@@ -68,6 +68,28 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--threads", "-"), set())
         self.assertEqual(self.completed("polydem", "sweep", ""), {"make", "run", "collect"})
 
+    def test_bash_completes_entries_after_set_and_quantities_after_colour(self):
+        rows = [line.split("|")[:2] for line in (LAUNCHER.parent / "src/config/entries.txt").read_text(
+            encoding="utf-8").splitlines() if line.count("|") == 8 and line[0] != "#"]
+        of = {}
+        for group, key in rows:
+            of.setdefault(group.strip(), set()).add(key.strip())
+        self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "integrate."),
+                         {f"integrate.{key}=" for key in of["integrate"]})
+        self.assertIn("scene.seed=", self.completed("polydem", "check", "a.nml", "--set", ""))
+        self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "wall.floor."),
+                         {f"wall.floor.{key}=" for key in of["wall"]})
+        self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "wall."), set())
+        quantities = set(re.findall(r'^    "(\w+)": Quantity\(', (
+            LAUNCHER.parent / "postproc/src/polydem_post/pictures/quantities.py").read_text(encoding="utf-8"), re.M))
+        for verb in ("plot", "movie", "view"):
+            self.assertEqual(self.completed("polydem", verb, "x", "--colour", ""), {*quantities, "none"})
+            self.assertEqual(self.completed("polydem", verb, "x", "--color", "angl"), {"angle"})
+        for kind in ("zsh", "fish"):
+            text = call(LAUNCHER, "completion", kind)
+            self.assertIn("scene.seed=", text)
+            self.assertIn("angular_velocity angle rotation", text)
+
     def test_every_text_names_every_option(self):
         for kind in ("zsh", "fish", "man"):
             text = call(LAUNCHER, "completion", kind).replace("\\-", "-")

@@ -1,13 +1,13 @@
 """Blocks of commands on the pages, and what the tests do with them.
 
-A remark, which is a comment of Markdown, may stand above a block:
+A remark, which is a comment of Markdown, may stand just below a block, so that readers of the text meet the block first:
 
     <!-- tests run: COMMANDS -->                the same commands, each with more words that make it short
     <!-- tests do not run this: REASON -->      an excuse
     <!-- tests run first: COMMANDS -->          commands of other pages on which the block relies
 
 A block of shell or Python commands without a remark is run as it is. A remark that matches no commands is an error:
-one above nothing, above another kind of block, above a block without commands, or one of two of a kind. A block `csv`,
+one below nothing, below another kind of block, below a block without commands, or one of two of a kind. A block `csv`,
 `json` or `nml` is a file, which is written before; the last file name above it is its name.
 """
 
@@ -71,35 +71,36 @@ def check_variant(block):
 
 def blocks_of(text):
     """All blocks of a page in their order."""
-    blocks, language, lines, remarks, file, comment = [], None, [], {}, "", None
+    blocks, language, lines, file, comment, below = [], None, [], "", None, False
     for number, line in enumerate(text.split("\n"), 1):
         fence = re.match(r"```(\w*)$", line)
         if comment is None and language is None and re.match(r"\s*<!--\s*tests?\b", line):
+            if not below:
+                raise PageError(f"line {number}: a remark on tests must stand just below its block")
             comment = ""
         if comment is not None:
             comment += line + "\n"
             if "-->" in line:
                 kind, words = _read_remark(comment, number)
-                if kind in remarks:
+                if kind in blocks[-1].remarks:
                     raise PageError(f"line {number}: a second remark '{kind}' for one block")
-                remarks[kind], comment = words, None
+                blocks[-1].remarks[kind], comment = words, None
         elif fence and language is None:
             language, lines = fence.group(1), []
         elif line == "```" and language is not None:
-            blocks.append(_checked(Block(language, "\n".join(lines) + "\n", number - len(lines), remarks, file)))
-            language, remarks = None, {}
+            blocks.append(Block(language, "\n".join(lines) + "\n", number - len(lines), {}, file))
+            language, below = None, True
         elif language is not None:
             lines.append(line)
         else:
-            if line.strip() and remarks:
-                raise PageError(f"line {number}: a remark on tests must stand just above its block")
+            below = False
             file = (re.findall(r"`([\w/.]+\.\w+)`", line) or [file])[-1]
-    if language is not None or comment is not None or remarks:
-        raise PageError(f"the last block or remark does not end, or the remark has no block: {comment or remarks}")
+    if language is not None or comment is not None:
+        raise PageError(f"the last block or remark does not end: {comment or language}")
     hidden = COMMAND.search(re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
     if hidden:
         raise PageError(f"a command in an indented block, which must be a block ```sh: {hidden.group(0)}")
-    return blocks
+    return [_checked(block) for block in blocks]
 
 
 def _read_remark(comment, number):

@@ -48,6 +48,16 @@ def test_every_page_is_in_the_site_and_in_the_search(site):
     assert {str(html_of(page, site).relative_to(site)) for page in PAGES} <= found
 
 
+def test_the_search_finds_words_of_names(site):
+    """Finds that `inertial_number` is one word, which a search for its words does not meet."""
+    index = json.loads((site / "search" / "search_index.json").read_text(encoding="utf-8"))
+    plain = {entry["location"]: re.sub(r"<[^>]*>|[^\w\s-]", " ", entry["text"]).lower() for entry in index["docs"]}
+    found = {location for location, text in plain.items()
+             if {"inertial", "number"} <= set(re.split(index["config"]["separator"], text))}
+    assert {"inputs/walls.html#series", "inputs/glossary.html", "inputs/cells.html#a-cell-that-obeys-a-stress",
+            "postproc/analysis.html"} <= found
+
+
 def test_the_site_fetches_nothing(site):
     assert [page for page in site.rglob("*.html") if FETCHED.search(page.read_text(encoding="utf-8"))] == []
 
@@ -68,7 +78,7 @@ def test_equations_become_mathml(tmp_path):
 
 
 def test_remarks_on_tests_are_small_print_behind_their_block(tmp_path):
-    root = small_root(tmp_path / "root", "# T\n\n<!-- tests do not run this: a day on one core -->\n```sh\nx\n```\n")
+    root = small_root(tmp_path / "root", "# T\n\n```sh\nx\n```\n<!-- tests do not run this: a day on one core -->\n")
     stage(root, tmp_path / "pages")
     text = (tmp_path / "pages" / "README.md").read_text(encoding="utf-8")
     assert text.index("```sh") < text.index("The tests do not run this: a day on one core")

@@ -67,11 +67,11 @@ def test_a_command_that_fails_is_found(tmp_path):
 @pytest.mark.parametrize("text", [
     "    ./polydem run inputs/drum.nml\n",
     "```\n./polydem run inputs/drum.nml\n```\n",
-    "<!-- tests run: ./polydem check inputs/drum.nml -->\n```sh\n./polydem run inputs/drum.nml\n```\n",
-    "<!-- tests run: true -->\n```sh\n./polydem run a.nml   # comment\n./polydem run b.nml\n```\n",
-    "<!-- tests do not run this: why -->\n```sh\n./polydem run inputs/drum.nml\n```\n",
-    "<!-- tests skip: takes a week on one core -->\n```sh\n./polydem run inputs/drum.nml\n```\n",
-    "<!-- tests do not run this: takes a week on one core -->\nText\n```sh\n./polydem run inputs/drum.nml\n```\n"])
+    "```sh\n./polydem run inputs/drum.nml\n```\n<!-- tests run: ./polydem check inputs/drum.nml -->\n",
+    "```sh\n./polydem run a.nml   # comment\n./polydem run b.nml\n```\n<!-- tests run: true -->\n",
+    "```sh\n./polydem run inputs/drum.nml\n```\n<!-- tests do not run this: why -->\n",
+    "```sh\n./polydem run inputs/drum.nml\n```\n<!-- tests skip: takes a week on one core -->\n",
+    "```sh\n./polydem run inputs/drum.nml\n```\nText\n<!-- tests do not run this: takes a week on one core -->\n"])
 def test_a_block_that_is_neither_run_nor_excused_is_found(text):
     with pytest.raises(PageError):
         blocks_of(text)
@@ -84,18 +84,20 @@ VARIANT = "<!-- tests run: true -->\n"
 @pytest.mark.parametrize("text", [
     EXCUSE,
     "Text\n\n" + EXCUSE + "\n",
-    EXCUSE + "```text\n./polydem run inputs/drum.nml\n```\n",
-    EXCUSE + "`a.csv`\n```csv\na,b\n```\n",
-    EXCUSE + "```sh\n```\n",
-    EXCUSE + "```sh\n# ./polydem run inputs/drum.nml\n\n```\n",
-    EXCUSE + "```python\n# nothing\n```\n",
-    EXCUSE + EXCUSE + "```sh\ntrue\n```\n",
-    VARIANT + VARIANT + "```sh\ntrue\n```\n",
-    EXCUSE + VARIANT + "```sh\ntrue\n```\n",
-    "<!--tests do not run this: takes a week on one core -->\n```sh\ntrue\n```\n",
+    EXCUSE + "```sh\ntrue\n```\n",
+    "```sh\ntrue\n```\n\n" + EXCUSE,
+    "```text\n./polydem run inputs/drum.nml\n```\n" + EXCUSE,
+    "`a.csv`\n```csv\na,b\n```\n" + EXCUSE,
+    "```sh\n```\n" + EXCUSE,
+    "```sh\n# ./polydem run inputs/drum.nml\n\n```\n" + EXCUSE,
+    "```python\n# nothing\n```\n" + EXCUSE,
+    "```sh\ntrue\n```\n" + EXCUSE + EXCUSE,
+    "```sh\ntrue\n```\n" + VARIANT + VARIANT,
+    "```sh\ntrue\n```\n" + EXCUSE + VARIANT,
+    "```sh\ntrue\n```\n<!--tests do not run this: takes a week on one core -->\n",
     " " + EXCUSE,
-    "<!-- tests do not run this: takes a week on one core\n",
-    "<!-- tests run first: true -->\n```f90\nend\n```\n",
+    "```sh\ntrue\n```\n<!-- tests do not run this: takes a week on one core\n",
+    "```f90\nend\n```\n<!-- tests run first: true -->\n",
     "```sh\ntrue\n"])
 def test_a_remark_that_matches_no_commands_is_found(text):
     with pytest.raises(PageError):
@@ -114,11 +116,11 @@ def test_the_tests_that_excuses_name_exist():
 
 
 def test_an_excuse_of_commands_is_accepted():
-    block, = blocks_of(EXCUSE + "```sh\n# a remark\n./polydem run inputs/drum.nml\n```\n")
+    block, = blocks_of("```sh\n# a remark\n./polydem run inputs/drum.nml\n```\n" + EXCUSE)
     assert block.commands is None
 
 
 def test_a_variant_has_more_words():
-    block, = blocks_of("<!-- tests run: ./polydem run --threads 1 a.nml --set integrate.duration=1 -->\n"
-                       "```sh\n./polydem run a.nml   # a remark\n```\n")
+    block, = blocks_of("```sh\n./polydem run a.nml   # a remark\n```\n"
+                       "<!-- tests run: ./polydem run --threads 1 a.nml --set integrate.duration=1 -->\n")
     assert block.commands == "./polydem run --threads 1 a.nml --set integrate.duration=1\n"

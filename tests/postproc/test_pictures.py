@@ -6,12 +6,15 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from matplotlib.colors import Normalize, to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from polydem_post import Frame, ResultError, Trajectory
 from polydem_post.command_line.main import help_text, main
-from polydem_post.pictures.drawing import OVERLAYS, Look, settle
+from polydem_post.pictures import draw
+from polydem_post.pictures.drawing import MATERIAL_COLOURS, OVERLAYS, Look, settle
 from polydem_post.pictures.limits import Span
-from polydem_post.pictures.plot import plot_frames
+from polydem_post.pictures.plot import length_text, plot_frames, round_length
 from polydem_post.pictures.quantities import QUANTITIES, pressure, range_of, stress
 from polydem_post.pictures.tree_cells import cell_grid, tree_cells
 from polydem_post.pictures.view_data import pack_run
@@ -116,6 +119,65 @@ def test_every_overlay_and_quantity_is_drawn_and_nothing_is_cut(run):
         labels = [text.get_text() for text in figure.legends[0].get_texts()]
         assert len(labels) == 7
         assert any(label.startswith("force ") and label.endswith("N/m or more") for label in labels)
+
+
+def test_up_to_three_frames_stand_in_a_row(run):
+    """Finds two frames above a third one, beside which a place is empty."""
+    for numbers, shape in (([0, 5], (1, 2)), ([0, 5, -1], (1, 3)), ([0, 3, 5, -1], (2, 3))):
+        assert plot_frames(run, numbers, Look()).axes[0].get_gridspec().get_geometry() == shape
+    wide = Look(limits=(-0.3, 0.3, -0.1, 0.05))
+    assert plot_frames(run, [0, 5, -1], wide).axes[0].get_gridspec().get_geometry() == (3, 1)
+
+
+def test_a_bar_of_a_round_length_stands_in_place_of_the_axes(run, small_drum, tmp_path):
+    path = tmp_path / "bar.svg"
+    assert main(["plot", str(small_drum), "--frames", "0,-1", "--no-title", "--scale-bar", "-o", str(path)]) == 0
+    text = path.read_text(encoding="utf-8")
+    assert ">20 mm<" in text or ">50 mm<" in text
+    assert "x [m]" not in text and ">t = " not in text
+    assert main(["plot", str(small_drum), "-o", str(path)]) == 0
+    text = path.read_text(encoding="utf-8")
+    assert ">x [m]<" in text and ">t = " in text and " mm<" not in text
+    figure = plot_frames(run, [0, -1], Look(scale_bar=True, limits=(-0.1, 0.1, -0.1, 0.1)))
+    bar, = (artist for axis in figure.axes for artist in axis.artists)
+    drawn = bar.size_bar.get_children()[0].get_window_extent()
+    ends = figure.axes[0].transData.inverted().transform(drawn.corners())
+    assert np.ptp(ends[:, 0]) == pytest.approx(0.05, rel=1e-6)
+    assert [round_length(most) for most in (0.05, 0.049, 1.0, 0.99, 7e5, 2.5e-7)] == pytest.approx(
+        [0.05, 0.02, 1.0, 0.5, 5e5, 2e-7])
+    assert [length_text(length) for length in (2e3, 5.0, 0.5, 1e-3, 2e-5, 5e-8)] == [
+        "2 km", "5 m", "500 mm", "1 mm", "20 µm", "5e-08 m"]
+
+
+def test_a_frame_is_drawn_into_axes_of_ones_own(run):
+    figure = Figure(layout="compressed")
+    left, right = figure.subplots(1, 2)
+    right.plot([0, 1], [1, 0])
+    left.set_title("mine")
+    limits = (-0.1, 0.1, -0.1, 0.05)
+    grains = draw(run[-1], left, colour="pressure", show=("forces",), limits=limits, colour_range=(0.0, 50.0))
+    assert left.get_title() == "mine" and left.get_xlabel() == "" and len(right.lines) == 1
+    assert (*left.get_xlim(), *left.get_ylim()) == limits and left.get_aspect() == 1.0
+    free = run[-1].free
+    assert np.array_equal(grains.get_array(), QUANTITIES["pressure"].values(run[-1])[free])
+    assert grains.get_clim() == (0.0, 50.0) and len(grains.get_paths()) == free.sum()
+    figure.colorbar(grains, ax=left, label="pressure")
+    plain = draw(Frame.from_polygons([np.array([(0, 0), (2, 0), (2, 1), (0, 1)])]), right)
+    assert plain.get_array() is None and right.get_xlim() == pytest.approx((-0.04, 2.04))
+    with pytest.raises(ResultError, match="there is no colour red"):
+        draw(run[-1], left, colour="red")
+
+
+def test_colours_of_materials_differ_in_grey_too():
+    """Finds colours that a printer without colours makes alike; lightness of CIE 1976."""
+    rgb = np.array([to_rgb(colour) for colour in MATERIAL_COLOURS])
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    lightness = 116.0 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16.0
+    assert np.diff(np.sort(lightness)).min() > 5.0
+    assert np.diff(np.sort(lightness[1:6])).min() > 12.0
+    quantity = QUANTITIES["material"]
+    shown = Look(colour="material").colour_map(quantity)(Normalize(*range_of(quantity, np.empty(0)))(np.arange(10.0)))
+    assert np.allclose(shown[:, :3], rgb)
 
 
 def test_a_figure_that_is_too_small_says_so(run):

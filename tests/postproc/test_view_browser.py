@@ -1,5 +1,8 @@
 """The viewer in a real browser: pictures, numbers and what the user does. Skipped if there is none."""
 
+import os
+import subprocess
+
 import numpy as np
 import pytest
 from browser import need_browser, open_browser, open_view, picture_of
@@ -8,8 +11,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from polydem_post import Trajectory
+from polydem_post.pictures.drawing import SettledLook, cell_lines
 from polydem_post.pictures.quantities import QUANTITIES
 from polydem_post.pictures.tree_cells import cell_grid, tree_cells
+from polydem_post.pictures.view import write_view
 
 need_browser()
 
@@ -210,13 +215,34 @@ def test_play_scrub_keys_and_curves(page, run):
     js(page, "const s = document.getElementById('scrub'); s.value = 3; s.dispatchEvent(new Event('input'))")
     assert js(page, "return viewer.frame") == 3
     assert "frame 3" in page.find_element("id", "time").text
-    Select(page.find_element("id", "colour")).select_by_visible_text("pressure [N/m2]")
+    Select(page.find_element("id", "colour")).select_by_visible_text("pressure [N/m²]")
     assert js(page, "return viewer.colour") == "pressure"
     curve = page.find_elements("css selector", "#curves canvas")[0]
     ActionChains(page).move_to_element_with_offset(curve, curve.size["width"] // 2 - 6, 0).click().perform()
     assert js(page, "return viewer.frame") >= last - 1
     kinetic = js(page, "return viewer.run.facts.curves.kinetic.values")
     assert kinetic == pytest.approx(list(run.energy_balance["kinetic"]), rel=1e-6)
+
+
+def test_a_sheared_cell_has_its_border_and_contacts_across_it(browser, tmp_path):
+    (tmp_path / "cell.nml").write_text(
+        "&cell periodic = 'xy' low = 0.01, 0 size = 0.06, 0.05 shear_rate = -30 profile = .true. /\n"
+        "&grains name = 'sample' region = 'box' low = 0, 0 high = 0.06, 0.05 number = 12 speed = 3 spin = 100 /\n"
+        "&forces gravity = 0, 0 stiffness = 2e5 /\n&integrate dt = 2e-5 duration = 0.06 /\n"
+        "&output frame_interval = 1e-3 contacts = .true. /\n", encoding="utf-8")
+    subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", "cell.nml"], cwd=tmp_path, check=True, capture_output=True)
+    run = Trajectory(tmp_path / "results" / "cell")
+    write_view(run, list(range(len(run))), tmp_path / "view.html")
+    open_view(browser, tmp_path / "view.html")
+    lines = js(browser, "viewer.show(30); return viewer.run.cellLines()")
+    look = SettledLook(limits=(0.0, 1.0, 0.0, 1.0))
+    assert np.array(lines) == pytest.approx(np.array([line.ravel() for line in cell_lines(run[30], look)]))
+    assert (np.abs(picture_of(browser)).max(axis=2) < 60).sum() > 100
+    for number, frame in enumerate(run):
+        there = js(browser, "viewer.show(arguments[0]); "
+                            "return Array.from(viewer.run.id, (_, i) => COLUMNS.pressure(viewer.run, i))", number)
+        true = QUANTITIES["pressure"].values(frame)
+        assert there == pytest.approx(true, abs=0.02 * max(np.abs(true).max(), 1.0))
 
 
 def test_without_webgl_the_page_says_so(browser, view):

@@ -65,6 +65,8 @@ def _add_look(parser) -> None:
     parser.add_argument("--map", metavar="NAME")
     parser.add_argument("--show", type=lambda text: tuple(filter(None, text.split(","))), metavar="A,B,C")
     parser.add_argument("--limits", type=_reals, metavar="X0,X1,Y0,Y1")
+    parser.add_argument("--no-title", action="store_true")
+    parser.add_argument("--scale-bar", action="store_true")
 
 
 def _reals(text: str) -> list[float]:
@@ -93,7 +95,7 @@ def look_of(options: argparse.Namespace):
         show = (*show, "forces")
     colour = options.colour or ("none" if show else "speed")
     look = Look(colour, show, options.limits and tuple(options.limits), options.range and tuple(options.range),
-                options.map)
+                options.map, title=not options.no_title, scale_bar=options.scale_bar)
     look.check()
     return look
 

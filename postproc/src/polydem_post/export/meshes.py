@@ -72,12 +72,21 @@ def body_mesh(frame: Frame, with_contacts: bool) -> Mesh:
 
 
 def contact_mesh(frame: Frame) -> Mesh:
-    """One line per contact, from centre of mass to centre of mass; at a fixed body it ends at the point of contact."""
+    """One line per contact, from centre of mass to centre of mass; at a fixed body it ends at the point of contact.
+
+    In a periodic cell a line over the border leaves the cell, towards the nearest copy of the second body, or of the
+    first one if that is fixed.
+    """
     contacts = frame.contacts
     n = len(contacts)
     ends = np.empty((2 * n, 2))
     for place, index in enumerate((contacts.first_index, contacts.second_index)):
         ends[place::2] = np.where(frame.fixed[index][:, None], contacts.point, frame.position[index])
+    if frame.cell_size.any():
+        first, second = contacts.first_index, contacts.second_index
+        at_first, at_second = (frame.fixed[index][:, None] for index in (first, second))
+        ends[0::2] = np.where(at_first, frame.position[second] + contacts.second_arm, ends[0::2])
+        ends[1::2] = np.where(at_first | at_second, ends[1::2], frame.position[first] - contacts.branch)
     return Mesh("Lines", in_space(ends), np.arange(2 * n), 2 * np.arange(n + 1), contact_data(frame))
 
 

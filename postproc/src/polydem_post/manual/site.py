@@ -24,6 +24,9 @@ FETCHED, WORKER = "https://unpkg.com/iframe-worker/shim", "offline_worker.js"
 #: First page of the sources, which FORD writes
 SOURCES = "sources/index.html"
 
+#: What separates words in the search: also underscores, so that the words of `inertial_number` are found one by one
+SEPARATOR = r"[\s\-_]+"
+
 #: File that marks a folder as made here
 MARK = ".made_by_polydem_manual"
 
@@ -110,7 +113,7 @@ def _settings(root: Path, folder: Path, output: Path, pages: list[Path], sources
         "theme": {"name": "material", "font": False,
                   "features": ["navigation.tabs", "search.highlight", "content.code.copy"],
                   "palette": [{"scheme": "default", "primary": "blue grey"}]},
-        "plugins": ["search", "offline"],
+        "plugins": [{"search": {"separator": SEPARATOR}}, "offline"],
         "markdown_extensions": [
             "tables", "sane_lists", "md_in_html", "pymdownx.inlinehilite", mathematics.__name__,
             {"toc": {"slugify": slugify(case="lower"), "permalink": True}},

@@ -23,7 +23,6 @@ MOST_LINES = 2000
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?!\w+:|#)([^)\s#]+)")
 REMARK = re.compile(r"^<!-- (tests run|tests do not run this): (.*?)\s+-->\n", re.MULTILINE | re.DOTALL)
-FENCE = re.compile(r"^(<!-- tests[^>]*-->\n)(```sh\n.*?^```\n)", re.MULTILINE | re.DOTALL)
 
 
 def find_pages(root: Path) -> list[Path]:
@@ -107,9 +106,8 @@ def _write_page(path: Path, title: str, text: str) -> None:
 
 
 def _show_remarks(text: str) -> str:
-    """Text in which the remarks on tests of command blocks, which are comments, follow their blocks as small print."""
-    swapped = FENCE.sub(lambda found: found.group(2) + found.group(1), text)
-    return REMARK.sub(lambda found: "\n" + _small_print(found.group(1), found.group(2)) + "\n", swapped)
+    """Text in which the remarks on tests below command blocks, which are comments, are small print."""
+    return REMARK.sub(lambda found: "\n" + _small_print(found.group(1), found.group(2)) + "\n", text)
 
 
 def _small_print(kind: str, words: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,15 +10,16 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D
 
+from ..base.polygons import FloatArray
 from ..base.result_file import ResultError
 from ..read.frames import Frame
 from ..read.trajectory import Trajectory
-from .limits import Span
+from .limits import MARGIN, Span
 from .quantities import QUANTITIES, Quantity, range_of, stress
 from .tree_cells import CellGrid, cell_grid, tree_cells
 
@@ -35,6 +37,14 @@ NEED_CONTACTS = ("contacts", "forces", "stress")
 WALL_COLOUR, PLAIN_COLOUR, UNKNOWN_COLOUR = "0.62", "#d9b98a", "0.85"
 FORCE_COLOUR, CONTACT_COLOUR, BOX_COLOUR, CELL_COLOUR = "#a01020", "#d55e00", "#0072b2", "#7a3db8"
 COMPRESSED_COLOUR, PULLED_COLOUR = "#a01020", "#0072b2"
+
+#: How the border of a periodic cell is drawn, above the bodies and below what is laid over them
+CELL_OUTLINE = {"color": "black", "linewidth": 0.6, "linestyle": (0.0, (4.0, 2.0)), "zorder": 2.5}
+
+#: Colours of materials 0 to 9, as light as differ in grey too, the first ones most
+MATERIAL_COLOURS = ("#e0be97", "#044786", "#eed453", "#0f9e7d", "#bb3939", "#f59b5a", "#571c53", "#cff3b4", "#0f82b1",
+                    "#de7fb4")
+matplotlib.colormaps.register(ListedColormap(MATERIAL_COLOURS, "materials"), force=True)
 
 #: Width of the line of the largest force as a share of the median equivalent diameter of the free bodies, and greatest
 #: width [pt]
@@ -68,6 +78,10 @@ class Look:
     greatest_force: float | None = None
     #: Pressure that has the longest cross [N/m2]; found from the frames if absent
     greatest_stress: float | None = None
+    #: Whether each frame has its time as a title
+    title: bool = True
+    #: Whether a bar of a round length stands in place of the axes
+    scale_bar: bool = False
     #: Grid of the quadtree
     grid: CellGrid | None = field(default=None, compare=False)
 
@@ -122,7 +136,7 @@ class _Extent:
         self.span.add(frame)
         free = ~frame.fixed
         if look.quantity and look.colour_range is None:
-            self.values.append(look.quantity.values(frame)[free])
+            self.values += _shown(frame, look.quantity.values_with_copies(frame), free)
         if "forces" in look.show and look.greatest_force is None:
             self.forces.append(frame.contacts.force_magnitude)
         if "stress" in look.show and look.greatest_stress is None:
@@ -140,9 +154,10 @@ class _Extent:
                               f"are at {', '.join(spans)}")
         if colour_range is None:
             colour_range = range_of(look.quantity, _joined(self.values)) if look.quantity else (0.0, 1.0)
-        return SettledLook(look.colour, look.show, limits, colour_range, look.colours,
-                           look.greatest_force or _covered(self.forces),
-                           look.greatest_stress or _covered(self.stresses), look.grid)
+        found = {"limits": limits, "colour_range": colour_range,
+                 "greatest_force": look.greatest_force or _covered(self.forces),
+                 "greatest_stress": look.greatest_stress or _covered(self.stresses)}
+        return SettledLook(**{**vars(look), **found})
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -161,28 +176,62 @@ def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLoo
         named = [name for name in look.show if name in NEED_CONTACTS] or [look.colour]
         raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
                           "output.contacts = .true.")
-    extent = _Extent(trajectory[0])
-    for frame in trajectory[numbers]:
+    return settle_frames(trajectory[0], trajectory[numbers], look)
+
+
+def settle_frames(start: Frame, frames: Iterable[Frame], look: Look) -> SettledLook:
+    """The same from the first frame of a run and those that are shown."""
+    extent = _Extent(start)
+    for frame in frames:
         extent.add(frame, look)
     if "cells" in look.show:
-        look = replace(look, grid=cell_grid(trajectory[0]))
+        look = replace(look, grid=cell_grid(start))
     return extent.settle(look)
 
 
+def _shown(frame: Frame, values: list[np.ndarray], chosen: np.ndarray) -> list[np.ndarray]:
+    """Of the values of bodies and of their copies those of some bodies, and of their copies that reach into the cell."""
+    own, *copies = values
+    return [own[chosen], *(values[chosen & _reaches_in(frame, shift)] for shift, values in zip(frame.shifts, copies))]
+
+
+def _reaches_in(frame: Frame, shift: FloatArray) -> np.ndarray:
+    """Which bodies reach into the periodic cell in its copy at a vector, (n)."""
+    low, high = frame.bounds[:, :2] + shift, frame.bounds[:, 2:] + shift
+    inside = (high > frame.cell_low) & (low < frame.cell_low + frame.cell_size)
+    return np.all(inside | (frame.cell_size == 0.0), axis=1)
+
+
 class Bodies:
-    """The fixed or the free bodies in axes, in a periodic cell with copies around it.
+    """The fixed or the free bodies in axes. Of a periodic cell with its copies only what is within its border is shown.
 
     Their outlines are views of one array, so moving them costs little.
     """
 
-    def __init__(self, axis: Axes, frame: Frame, are_fixed: bool, **style):
-        self._are_fixed = are_fixed
-        paths = self._outline(frame)
-        self.artist = PathCollection(paths, **style)
+    def __init__(self, axis: Axes, frame: Frame, look: SettledLook, are_fixed: bool, **style):
+        self._axis, self._are_fixed, self._style = axis, are_fixed, style
+        self._paths = self._outline(frame)
+        self.artist = PathCollection(self._paths, **style)
         axis.add_collection(self.artist, autolim=False)
-        copies = [PathCollection(paths, **style) for _ in frame.shifts]
-        _add_copies(axis, frame, copies)
-        self.artists = [self.artist, *copies]
+        self.artists = [self.artist]
+        self._place(frame, look)
+
+    def _place(self, frame: Frame, look: SettledLook) -> None:
+        """Put the copies where they are, which a sheared cell changes, and colour all."""
+        for _ in frame.shifts[len(self.artists) - 1 :]:
+            copy = PathCollection(self._paths, **self._style)
+            copy.set_animated(self.artist.get_animated())
+            self._axis.add_collection(copy, autolim=False)
+            self.artists.append(copy)
+        for k, artist in enumerate(self.artists[1:]):
+            artist.set_visible(k < len(frame.shifts))
+        _shift(self._axis, frame, self.artists[1:])
+        _clip_to_cell(self._axis, frame, look, self.artists)
+        if look.quantity and not self._are_fixed:
+            values = look.quantity.values_with_copies(frame)
+            for artist, each in zip(self.artists, values):
+                artist.set_array(each[self.rows])
+            self.shown = np.concatenate(_shown(frame, values, frame.free))
 
     def _outline(self, frame: Frame) -> list[Path]:
         """The outlines of the bodies of a frame."""
@@ -199,7 +248,8 @@ class Bodies:
         return [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
 
     def set(self, **properties: Any) -> None:
-        """Set properties of the artist and of its copies."""
+        """Set properties of the artist and of its copies, also of those that come later."""
+        self._style |= properties
         for artist in self.artists:
             artist.set(**properties)
 
@@ -208,27 +258,70 @@ class Bodies:
         if np.array_equal(frame.id, self._present):
             self._vertices[:] = frame.vertex[self._chosen]
         else:
-            paths = self._outline(frame)
+            self._paths = self._outline(frame)
             for artist in self.artists:
-                artist.set_paths(paths)
-        if look.quantity and self.artist.get_array() is not None:
-            self.set(array=look.quantity.values(frame)[self.rows])
+                artist.set_paths(self._paths)
+        self._place(frame, look)
 
 
-def _add_copies(axis: Axes, frame: Frame, copies: list[PathCollection]) -> None:
-    """Draw an artist again in each of the copies around a periodic cell."""
+class CellOutline:
+    """The border of a periodic cell, with the ends of the borders of the copies above and below, which a shear moves."""
+
+    def __init__(self, axis: Axes, frame: Frame, look: SettledLook):
+        self.artist = Line2D([], [], **CELL_OUTLINE)
+        axis.add_line(self.artist)
+        self.artists = [self.artist]
+        self.move(frame, look)
+
+    def move(self, frame: Frame, look: SettledLook) -> None:
+        """Move it to where it is in another frame."""
+        lines = cell_lines(frame, look)
+        self.artist.set_data(*np.concatenate([np.vstack([line, [np.nan, np.nan]]) for line in lines]).T
+                             if lines else ([], []))
+
+
+def cell_lines(frame: Frame, look: SettledLook) -> list[FloatArray]:
+    """Lines of the border of a periodic cell, (points, 2) each [m]; none in the plane."""
+    (x0, y0), (x1, y1) = _visible_cell(frame, look)
+    lines = [np.array(ends) for axis, ends in (
+        (0, [(x0, y0), (x0, y1)]), (0, [(x1, y0), (x1, y1)]), (1, [(x0, y0), (x1, y0)]), (1, [(x0, y1), (x1, y1)]))
+        if frame.cell_size[axis] > 0.0]
+    if frame.shift > 0.0:
+        stub = MARGIN * max(frame.cell_size)
+        lines += [np.array([(x, y), (x, y + way)]) for x, y, way in (
+            (x0 + frame.shift, y1, stub), (x1 - frame.shift, y0, -stub))]
+    return lines
+
+
+def _visible_cell(frame: Frame, look: SettledLook) -> FloatArray:
+    """Lower left and upper right corner of the periodic cell, along the other axis far beyond the limits, (2, 2) [m]."""
+    low, high = np.array(look.limits[::2]), np.array(look.limits[1::2])
+    ends = np.array([low - (high - low), high + (high - low)])
+    return np.where(frame.cell_size > 0.0, [frame.cell_low, frame.cell_low + frame.cell_size], ends)
+
+
+def _clip_to_cell(axis: Axes, frame: Frame, look: SettledLook, artists: list[PathCollection]) -> None:
+    """Show artists within a periodic cell only."""
+    if not frame.cell_size.any():
+        return
+    (x0, y0), (x1, y1) = _visible_cell(frame, look)
+    border = Path(np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]), closed=True)
+    for artist in artists:
+        artist.set_clip_path(border, axis.transData)
+
+
+def _shift(axis: Axes, frame: Frame, copies: list[PathCollection]) -> None:
+    """Put copies of an artist into the copies around a periodic cell."""
     for shift, copy in zip(frame.shifts, copies):
         copy.set_transform(Affine2D().translate(*shift) + axis.transData)
-        axis.add_collection(copy, autolim=False)
 
 
 def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bodies]:
     """Draw the fixed and the free bodies."""
-    walls = Bodies(axis, frame, True, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
-    grains = Bodies(axis, frame, False, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
-    if look.quantity:
-        grains.set(array=look.quantity.values(frame)[grains.rows], cmap=look.colour_map(look.quantity),
-                          norm=Normalize(*look.colour_range))
+    walls = Bodies(axis, frame, look, True, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
+    colours = {"cmap": look.colour_map(look.quantity), "norm": Normalize(*look.colour_range)} if look.quantity else {}
+    grains = Bodies(axis, frame, look, False, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2,
+                    **colours)
     return walls, grains
 
 
@@ -242,8 +335,9 @@ def overlays(axis: Axes, frame: Frame, look: SettledLook) -> list[PathCollection
     for order, artists in enumerate(alike):
         for artist in artists:
             artist.set_zorder(3 + order)
-        axis.add_collection(artists[0], autolim=False)
-        _add_copies(axis, frame, list(artists[1:]))
+            axis.add_collection(artist, autolim=False)
+        _shift(axis, frame, list(artists[1:]))
+        _clip_to_cell(axis, frame, look, list(artists))
     return [artist for artists in alike for artist in artists]
 
 
@@ -346,7 +440,7 @@ def legend_of(frame: Frame, look: SettledLook, scale: float) -> list[Line2D]:
                       for share, more in ((1.0, " or more"), (0.3, ""))]
         elif name == "stress" and look.greatest_stress:
             lines += [Line2D([], [], color=colour, linewidth=1.2, label=label) for colour, label in (
-                (COMPRESSED_COLOUR, f"compression {look.greatest_stress:.2g} N/m2 or more"),
+                (COMPRESSED_COLOUR, f"compression {look.greatest_stress:.2g} N/m² or more"),
                 (PULLED_COLOUR, "tension"))]
         elif name == "contacts":
             lines.append(Line2D([], [], color=CONTACT_COLOUR, marker="x", linestyle="none", label=OVERLAYS[name]))

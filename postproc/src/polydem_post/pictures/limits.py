@@ -27,11 +27,9 @@ class Span:
         self._first = _span(start, np.ones(len(start), dtype=bool))
         self._first_driven = _span(start, _driven(start))
         self._free, self._resting, self._driven = np.array(NOTHING), np.array(NOTHING), np.array(NOTHING)
-        self._periodic = np.zeros(2, dtype=bool)
 
     def add(self, frame: Frame) -> None:
         """Take a frame into account."""
-        self._periodic = frame.cell_size > 0.0
         driven = _driven(frame)
         self._free = _both(self._free, _span(frame, frame.free))
         self._driven = _both(self._driven, _span(frame, driven))
@@ -46,8 +44,7 @@ class Span:
         margin = MARGIN * max(high - low)
         if not 0.0 < margin < np.inf:
             raise ResultError("the bodies have no extent that can be drawn")
-        aside = np.where(self._periodic, 0.0, margin)
-        return low - aside, high + aside
+        return low - margin, high + margin
 
     def everything(self) -> FloatArray:
         """Lower left and upper right corner of all bodies, (2, 2) [m]."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -22,7 +23,7 @@ from ..read.trajectory import Trajectory
 from . import drawing
 from .drawing import Look, SettledLook
 from .film_files import write_gif, write_mp4
-from .plot import add_scale, finish_axes, prepare
+from .plot import add_scale, add_scale_bar, finish_axes, prepare
 
 #: Ends of the names of films, and what writes them
 FORMS = {".mp4": write_mp4, ".gif": write_gif}
@@ -59,11 +60,15 @@ class Painter:
         self._axis = self._figure.subplots()
         frame = trajectory[first]
         prepare(self._axis, film.look, self._title(frame.time))
-        self._bodies = drawing.draw_bodies(self._axis, frame, film.look)
-        add_scale(self._figure, [self._axis], self._bodies[1:], film.look, film.extend, frame.material_names)
+        if film.look.scale_bar:
+            add_scale_bar(self._axis, film.look)
+        walls, grains = drawing.draw_bodies(self._axis, frame, film.look)
+        outline = drawing.CellOutline(self._axis, frame, film.look)
+        self._moving: list[drawing.Bodies | drawing.CellOutline] = [walls, grains, outline]
+        add_scale(self._figure, [self._axis], [grains], film.look, film.extend, frame.material_names)
         finish_axes(self._figure, [self._axis], frame, film.look)
-        drawing.fit_outlines(self._bodies[1], frame, drawing.points_per_metre(self._axis))
-        for artist in (*(artist for each in self._bodies for artist in each.artists), self._axis.title):
+        drawing.fit_outlines(grains, frame, drawing.points_per_metre(self._axis))
+        for artist in (*self._artists(), self._axis.title):
             artist.set_animated(True)
         self._figure.set_layout_engine("none")
         self._canvas.draw()
@@ -73,16 +78,20 @@ class Painter:
         """A frame as red, green and blue of each picture element."""
         look = self._film.look
         frame = self._trajectory[number]
-        for each in self._bodies:
+        for each in self._moving:
             each.move(frame, look)
         self._axis.title.set_text(self._title(frame.time))
         self._canvas.restore_region(self._background)
         overlays = drawing.overlays(self._axis, frame, look)
-        for artist in (*(artist for each in self._bodies for artist in each.artists), *overlays, self._axis.title):
+        for artist in (*self._artists(), *overlays, self._axis.title):
             self._axis.draw_artist(artist)
         for artist in overlays:
             artist.remove()
         return np.ascontiguousarray(np.asarray(self._canvas.buffer_rgba())[..., :3]).tobytes()
+
+    def _artists(self) -> Iterator[Artist]:
+        """What is drawn anew in each frame below the overlays."""
+        return (artist for each in self._moving for artist in each.artists)
 
     def _title(self, moment: float) -> str:
         return f"t = {moment:.{self._film.digits}f} s"

@@ -6,13 +6,17 @@ import math
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PathCollection
 from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from ..base.new_file import insist_on_own, new_file
 from ..base.result_file import ResultError, cannot_write
@@ -31,6 +35,12 @@ INCH = 25.4
 #: Picture elements per inch, unless they are given
 DPI = 150
 
+#: Greatest length of the bar of a scale as a share of the width of what is shown
+BAR = 0.25
+
+#: Frames that stand in one row, unless they are more than so many times wider than high
+ONE_ROW, WIDEST = 3, 3.0
+
 
 def plot_frames(trajectory: Trajectory, numbers: list[int], look: Look | None = None, size: tuple | None = None,
                 columns: int | None = None, dpi: float = DPI) -> Figure:
@@ -48,6 +58,8 @@ def plot_frames(trajectory: Trajectory, numbers: list[int], look: Look | None = 
     axes = axes[: len(numbers)]
     for place, (axis, frame) in enumerate(zip(axes, frames)):
         prepare(axis, settled, f"t = {frame.time:.4g} s")
+        if settled.scale_bar and place == (rows - 1) * columns:
+            add_scale_bar(axis, settled)
         axis.label_outer()
         if place + columns >= len(axes):  # the lowest of its column, also above an empty place
             axis.xaxis.set_tick_params(labelbottom=True)
@@ -56,13 +68,62 @@ def plot_frames(trajectory: Trajectory, numbers: list[int], look: Look | None = 
     return figure
 
 
+def draw(frame: Frame, axes: Axes, **look: Any) -> PathCollection:
+    """Draw a frame into axes of a figure of your own, as `plot` does; returns the free bodies, for a `colorbar`.
+
+    Keywords are those of `pictures.drawing.Look`: `colour` (a quantity, "none" unless given), `show` (names of
+    overlays, as ("forces",)), `limits` (x0, x1, y0, y1) [m], `colour_range` (least, greatest), `colours` (a colour map
+    of matplotlib), `greatest_force` [N/m], `greatest_stress` [N/m2] and `scale_bar`. What is not given is found from
+    this frame: give the ranges where several frames shall be on one scale.
+
+    The axes get limits and equal scales; titles, labels and legends are left to you. Lines that are as wide as forces
+    suit the size that the axes have now, so give them their place before.
+    """
+    wanted = Look(**look)
+    wanted.check()
+    settled = drawing.settle_frames(frame, [frame], wanted)
+    x0, x1, y0, y1 = settled.limits
+    axes.set(xlim=(x0, x1), ylim=(y0, y1))
+    axes.set_aspect("equal", adjustable="box")
+    axes.apply_aspect()
+    if settled.scale_bar:
+        add_scale_bar(axes, settled)
+    return _fill(axes, frame, settled, drawing.draw_bodies(axes, frame, settled)[1]).artist
+
+
 def prepare(axis, look: SettledLook, title: str) -> None:
     """Limits, labels and equal scales of axes."""
     x0, x1, y0, y1 = look.limits
     axis.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x [m]", ylabel="y [m]")
     axis.set_aspect("equal", adjustable="box")
-    axis.set_title(title, fontsize=9)
+    if look.title:
+        axis.set_title(title, fontsize=9)
     axis.spines[["top", "right"]].set_visible(False)
+    if look.scale_bar:
+        axis.set_axis_off()
+
+
+def add_scale_bar(axis: Axes, look: SettledLook) -> None:
+    """A bar of a round length below the axes, in their place."""
+    axis.set_axis_off()
+    length = round_length(BAR * (look.limits[1] - look.limits[0]))
+    axis.add_artist(AnchoredSizeBar(axis.transData, length, length_text(length), "upper left", pad=0.0, borderpad=0.4,
+                                    sep=3.0, frameon=False, bbox_to_anchor=(0.0, 0.0), bbox_transform=axis.transAxes,
+                                    size_vertical=0.004 * (look.limits[3] - look.limits[2]), fill_bar=True))
+
+
+def round_length(most: float) -> float:
+    """The greatest of 1, 2 and 5 times a power of ten that is not above a length."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= most * (1.0 + 1e-12))
+
+
+def length_text(length: float) -> str:
+    """A length [m] in a unit in which it is a number from 1 to 999, if there is one."""
+    for unit, size in (("km", 1e3), ("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+        if length >= size * (1.0 - 1e-12):
+            return f"{length / size:.4g} {unit}"
+    return f"{length:.4g} m"
 
 
 def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | None = None,
@@ -74,7 +135,7 @@ def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | Non
     if not look.quantity:
         return None
     low, high = look.colour_range
-    values = np.concatenate([np.asarray(each.artist.get_array()) for each in grains])
+    values = np.concatenate([each.shown for each in grains])
     values = values[np.isfinite(values)]
     below, above = bool((values < low).any()), bool((values > high).any())
     arrows = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
@@ -99,8 +160,15 @@ def _finish(figure: Figure, axes, frames: list[Frame], look: SettledLook) -> Non
     add_scale(figure, axes, grains, look, materials=frames[0].material_names)
     finish_axes(figure, axes, frames[0], look)
     for axis, frame, each in zip(axes, frames, grains):
-        drawing.fit_outlines(each, frame, drawing.points_per_metre(axis))
-        drawing.overlays(axis, frame, look)
+        _fill(axis, frame, look, each)
+
+
+def _fill(axis: Axes, frame: Frame, look: SettledLook, grains: drawing.Bodies) -> drawing.Bodies:
+    """Give bodies in axes of their final size outlines, overlays and the border of the cell."""
+    drawing.fit_outlines(grains, frame, drawing.points_per_metre(axis))
+    drawing.overlays(axis, frame, look)
+    drawing.CellOutline(axis, frame, look)
+    return grains
 
 
 def finish_axes(figure: Figure, axes, frame: Frame, look: SettledLook) -> None:
@@ -169,8 +237,10 @@ def check_form(path: Path) -> str:
 
 
 def _columns(count: int, look: SettledLook) -> int:
-    """Panels side by side: so many that the figure is about as wide as a page."""
+    """Panels side by side: up to three in a row, more so that the figure is about as wide as a page."""
     x0, x1, y0, y1 = look.limits
+    if count <= ONE_ROW and x1 - x0 <= WIDEST * (y1 - y0):
+        return count
     return max(1, min(count, round(math.sqrt(1.6 * count * (y1 - y0) / (x1 - x0)))))
 
 

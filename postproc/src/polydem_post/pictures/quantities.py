@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Callable
 
 import numpy as np
@@ -18,7 +18,7 @@ COVERED = 99.5
 NARROWEST = 1e-9
 
 #: What a range spans at least, so that what is at rest looks so: by unit
-LEAST = {"m/s": 1e-6, "rad/s": 1e-4, "N/m": 1e-6, "N/m2": 1e-3}
+LEAST = {"m/s": 1e-6, "rad/s": 1e-4, "N/m": 1e-6, "N/m²": 1e-3}
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,8 @@ class Quantity:
     needs_contacts: bool = False
     #: Whether the value of a body never changes
     constant: bool = False
+    #: Whether the value depends on the velocity along x, which copies across a sheared border have not in common
+    along_shear: bool = False
 
     @property
     def title(self) -> str:
@@ -48,6 +50,14 @@ class Quantity:
     def count(self) -> int:
         """Number of classes, 0 if the values are continuous."""
         return {"id": 20, "material": 10}.get(self.label.split()[0], 0) if self.span == "class" else 0
+
+    def values_with_copies(self, frame: Frame) -> list[np.ndarray]:
+        """Values of a frame, and of the copies in each of `frame.shifts`, (n) each."""
+        found = {0.0: self.values(frame)}
+        moves = frame.copy_velocities[:, 0] if self.along_shear else np.zeros(len(frame.shifts))
+        for speed in np.unique(moves[moves != 0.0]):
+            found[speed] = self.values(replace(frame, velocity=frame.velocity + np.array([speed, 0.0])))
+        return [found[0.0], *(found[speed] for speed in moves)]
 
 
 def range_of(quantity: Quantity, values: np.ndarray) -> tuple[float, float]:
@@ -108,8 +118,9 @@ def _given(values: np.ndarray) -> np.ndarray:
 
 #: What bodies can be coloured by
 QUANTITIES = {
-    "speed": Quantity("speed", "m/s", lambda f: f.speed),
-    "velocity_x": Quantity("velocity along x", "m/s", lambda f: f.velocity[:, 0], "coolwarm", "both"),
+    "speed": Quantity("speed", "m/s", lambda f: f.speed, along_shear=True),
+    "velocity_x": Quantity("velocity along x", "m/s", lambda f: f.velocity[:, 0], "coolwarm", "both",
+                           along_shear=True),
     "velocity_y": Quantity("velocity along y", "m/s", lambda f: f.velocity[:, 1], "coolwarm", "both"),
     "angular_velocity": Quantity("angular velocity", "rad/s", lambda f: f.angular_velocity, "PuOr", "both"),
     "angle": Quantity("angle", "rad", lambda f: np.mod(f.angle, 2.0 * np.pi), "twilight", "turn"),
@@ -117,15 +128,15 @@ QUANTITIES = {
     "size": Quantity("equivalent diameter", "m", lambda f: f.equivalent_diameter, "cividis", "data",
                      constant=True),
     "mass": Quantity("mass per depth", "kg/m", lambda f: _given(f.mass), "cividis", "data", constant=True),
-    "density": Quantity("density", "kg/m3", lambda f: _given(f.mass) / f.area, "cividis", "data", constant=True),
-    "material": Quantity("material", "", lambda f: f.material.astype(float), "tab10", "class", constant=True),
+    "density": Quantity("density", "kg/m³", lambda f: _given(f.mass) / f.area, "cividis", "data", constant=True),
+    "material": Quantity("material", "", lambda f: f.material.astype(float), "materials", "class", constant=True),
     "force": Quantity("resultant of the contact forces", "N/m", lambda f: _length(f.force), "YlOrRd",
                       needs_contacts=True),
     "load": Quantity("sum of the contact forces' magnitudes", "N/m", load, "YlOrRd", needs_contacts=True),
     "coordination": Quantity("number of contacts", "", lambda f: f.coordination.astype(float),
                              needs_contacts=True),
-    "pressure": Quantity("pressure", "N/m2", pressure, "YlOrRd", needs_contacts=True),
-    "shear_stress": Quantity("shear stress", "N/m2", shear_stress, "YlOrRd", needs_contacts=True),
+    "pressure": Quantity("pressure", "N/m²", pressure, "YlOrRd", needs_contacts=True),
+    "shear_stress": Quantity("shear stress", "N/m²", shear_stress, "YlOrRd", needs_contacts=True),
     "id": Quantity("id modulo 20", "", lambda f: np.mod(f.id, 20).astype(float), "tab20", "class",
                    constant=True),
 }

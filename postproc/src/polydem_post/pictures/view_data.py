@@ -97,12 +97,12 @@ class _Contacts:
         self.bodies = len(frame.id)
         order = np.lexsort((contacts.second_index, contacts.first_index))
         first, second = contacts.first_index[order], contacts.second_index[order]
-        base = np.where(frame.fixed[first], second, first)
         pair = first.astype(np.int64) * self.bodies + second
         # Two bodies of several pieces may have several contacts, each with a row of its own in the list of pairs.
         self.keys.add(pair * MOST_CONTACTS + np.minimum(np.arange(len(pair)) - np.searchsorted(pair, pair),
                                                         MOST_CONTACTS - 1))
-        self.arms.add(contacts.point[order] - frame.position[base])
+        # The point lies at the first body, and in a periodic cell perhaps at another copy of the second one.
+        self.arms.add(np.where(frame.fixed[first][:, None], contacts.second_arm[order], contacts.first_arm[order]))
         self.forces.add(contacts.force[order])
 
     def pack(self, packed: Packed, reach: float) -> None:
@@ -189,6 +189,7 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     values = {name: _Rows(np.float32) for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
     table, first, span = _Contacts(), None, Span(trajectory[0])
     everybody = _Everybody(trajectory[numbers])
+    cells: list[list[float]] = []
     for present in trajectory[numbers]:
         frame, absent = everybody.with_absent(present)
         if first is None:
@@ -203,6 +204,7 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
                     found = np.where(absent, np.nan, found)
                 collected.add(found[~frame.fixed])
         span.add(present)
+        cells.append([*map(float, (*present.cell_low, *present.cell_size, present.shift))])
         if contacts:
             table.add(frame)
         if progress:
@@ -213,6 +215,8 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     if contacts:
         table.pack(packed, reach)
     _describe(packed, trajectory, numbers, values)
+    if present.cell_size.any():
+        packed.facts["cells"] = cells
     packed.facts["limits"] = [float(side) for corner in span.limits() for side in corner]
     return packed
 

@@ -71,6 +71,10 @@ class Frame:
         cell_low          [m]      x and y of the lower left corner of the periodic cell, as of vectors
         cell_size         [m]      width and height of the periodic cell, as of vectors; 0 along an axis without period
 
+    Found from the namelist:
+
+        jump              [m/s]    velocity of the copy of a sheared cell above it, along x as of vectors
+
     Everything else is computed from these when it is first asked for.
     """
 
@@ -94,6 +98,7 @@ class Frame:
     shift: float = 0.0
     cell_low: FloatArray = field(default_factory=lambda: np.zeros(2))
     cell_size: FloatArray = field(default_factory=lambda: np.zeros(2))
+    jump: float = 0.0
     _source: FrameSource | None = field(default=None)
 
     def __post_init__(self) -> None:
@@ -190,12 +195,21 @@ class Frame:
     @property
     def shifts(self) -> FloatArray:
         """Vectors to the m copies of the periodic cell around it [m], (m, 2): none in the plane."""
+        copies = self._copies
+        return copies * self.cell_size + np.outer(copies[:, 1], [self.shift, 0.0])
+
+    @property
+    def copy_velocities(self) -> FloatArray:
+        """Velocities of these copies relative to the cell [m/s], (m, 2): 0 unless it is sheared."""
+        return np.outer(self._copies[:, 1], [self.jump, 0.0])
+
+    @property
+    def _copies(self) -> FloatArray:
+        """Number of cells along x and y to each of the copies around the cell, (m, 2)."""
         steps = [(-1, 0, 1) if size > 0.0 else (0,) for size in self.cell_size]
         copies = np.array([(x, y) for x in steps[0] for y in steps[1] if x or y], dtype=float).reshape(-1, 2)
         # A copy that slides by up to a width needs another one behind it.
-        if self.shift > 0.0:
-            copies = np.concatenate([copies, [(-2.0, 1.0), (2.0, -1.0)]])
-        return copies * self.cell_size + np.outer(copies[:, 1], [self.shift, 0.0])
+        return np.concatenate([copies, [(-2.0, 1.0), (2.0, -1.0)]]) if self.shift > 0.0 else copies
 
     @cached_property
     def spans(self) -> npt.NDArray[np.bool_]:

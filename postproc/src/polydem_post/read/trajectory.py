@@ -374,6 +374,7 @@ class Trajectory:
         crossed = [name for name in ("image", "slid") if name in frames]
         columns = {name: rows.column(name, row) for name in (*GROWING, *crossed)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
+        jump = self._jump(bodies["cell_size"][1], float(segment.times[row])) if "shift" in frames else 0.0
         if self._shift is not None:
             columns["position"] = columns["position"] + self._shift
             bodies = {**bodies, "cell_low": bodies["cell_low"] + self._shift} if "cell_low" in bodies else bodies
@@ -381,8 +382,14 @@ class Trajectory:
             columns, bodies = _without(file["walls/id"][:][file["walls/present"][row] == 0], columns, bodies)
         names = tuple(self.settings.get("material", {})) if "material" in bodies else ()
         return sound_frame(segment.path, Frame(
-            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, shift=shift,
+            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, shift=shift, jump=jump,
             material_names=names, **columns, **bodies, _source=self))
+
+    def _jump(self, height: float, time: float) -> float:
+        """Velocity along x of the copy above a sheared cell of this height at a time [m/s] (`find_shear` of cell.f90)."""
+        cell = self.settings.cell
+        share = min(time / cell.shear_ramp, 1.0) if cell.get("shear_ramp", 0.0) > 0.0 else 1.0
+        return float(cell.get("shear_rate", 0.0) * height * share**2 * (3.0 - 2.0 * share))
 
     def contacts_of(self, frame: Frame) -> Contacts:
         """The contacts of a frame of this run; `frame.contacts` calls it."""

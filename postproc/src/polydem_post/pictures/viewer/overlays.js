@@ -27,22 +27,22 @@ function widestForce(run) { return 0.45 * run.facts.size; }
 function forceSegments(run, list) {
   const t = run.contacts(), widest = widestForce(run), least = 0.002 * widest;
   const factor = widest / run.facts.contacts.covered;
-  const [originX, originY] = run.origin, {state, fixed} = run;
+  const {state, fixed} = run;
   list.clear(4 * t.most);
   const {data} = list;
   let k = 0;
   for (let c = 0; c < t.n; c++) {
     const width = Math.min(t.size[c] * factor, widest);
     if (width < least) continue;
-    const x = t.x[c] - originX, y = t.y[c] - originY;
     for (let side = 0; side < 2; side++) {
       const i = side === 0 ? t.first[c] : t.second[c];
       if (fixed[i]) continue;
       data[k] = state[4 * i];
       data[k + 1] = state[4 * i + 1];
       data[k + 2] = width;
-      data[k + 4] = x;
-      data[k + 5] = y;
+      const [across, up] = run.arm(i, t.x[c], t.y[c]);
+      data[k + 4] = state[4 * i] + across;
+      data[k + 5] = state[4 * i + 1] + up;
       k += 8;
     }
   }
@@ -77,6 +77,16 @@ function bodyBoxes(run, list) {
     k += 4;
   }
   list.n = k / 4;
+}
+
+/** The border of the periodic cell, in lines of a width [m]. */
+function cellSegments(run, list, width) {
+  const [originX, originY] = run.origin, lines = run.cellLines();
+  list.clear(2 * lines.length);
+  lines.forEach(([x0, y0, x1, y1], k) => {
+    list.data.set([x0 - originX, y0 - originY, width, 0, x1 - originX, y1 - originY, 0, 0], 8 * k);
+  });
+  list.n = 2 * lines.length;
 }
 
 /** Name of an overlay -> what makes it, of which shapes, and its colour; those of pictures (drawing.py). */

@@ -221,6 +221,7 @@ class Painter {
       scale: [2 / (step * width), 2 / (step * height)], elements: [0.5 * width, 0.5 * height]};
     this.uploadBodies(colour);
     this.drawBodies(run.facts.size / step >= LEAST_OUTLINED * this.ratio);
+    if (run.facts.cells) this.drawCell(1.5 * this.ratio * step);
     for (const name of Object.keys(OVERLAYS)) {
       if (!overlays.has(name)) continue;
       const {make, shapes, colour: ink} = OVERLAYS[name], layer = this.layers[name];
@@ -321,6 +322,12 @@ class Painter {
     if (places.elements) gl.uniform2fv(places.elements, this.view.elements);
     gl.uniform3fv(places.ink, colour);
     gl.drawArrays(kind, 0, vertices * texels.n / each);
+  }
+
+  drawCell(width) {
+    cellSegments(this.run, this.outline.texels, width);
+    this.uploadLayer(this.outline);
+    this.drawLayer(this.outline, this.programs.segments, [0, 0, 0]);
   }
 
   drawChosen(i, width) {

@@ -20,6 +20,7 @@ class Run {
       run.series[name] = {quantum: fact.quantum, values: await readSeries(name, fact, run.frames, run.n)};
     }
     run.area = run.areas();
+    run.spans = run.spanning();
     if (facts.contacts) await run.readContacts();
     const [x0, y0, x1, y1] = facts.limits;
     /** Middle of what is shown [m]; single precision is only used relative to it. */
@@ -63,6 +64,46 @@ class Run {
       x: numbers(), y: numbers(), fx: numbers(), fy: numbers(), size: numbers()};
     const sums = () => new Float64Array(this.n);
     this.sums = {frame: -1, fx: sums(), fy: sums(), load: sums(), count: sums(), xx: sums(), yy: sums(), xy: sums()};
+  }
+
+  /** Whether a body is a fixed one about as long as the periodic cell, without copies, as in `spans` of frames.py. */
+  spanning() {
+    const spans = new Uint8Array(this.n), [, , width, height] = this.facts.cells ? this.facts.cells[0] : [0, 0, 0, 0];
+    const least = Math.min(width || Infinity, height || Infinity);
+    for (let i = 0; i < this.n; i++) {
+      for (let v = 2 * this.start[i]; this.fixed[i] && v < 2 * this.start[i + 1]; v += 2) {
+        if (4 * Math.max(Math.abs(this.shape[v]), Math.abs(this.shape[v + 1])) >= least) spans[i] = 1;
+      }
+    }
+    return spans;
+  }
+
+  /** Vector from a body to a point, in a periodic cell to its nearest copy. */
+  arm(i, x, y) {
+    let dx = x - this.x[i], dy = y - this.y[i];
+    if (!this.facts.cells || this.spans[i]) return [dx, dy];
+    const [, , width, height, shift] = this.facts.cells[this.frame];
+    if (height) {
+      const copies = Math.round(dy / height);
+      dx -= copies * shift;
+      dy -= copies * height;
+    }
+    if (width) dx -= Math.round(dx / width) * width;
+    return [dx, dy];
+  }
+
+  /** Ends of the lines of the border of the periodic cell, as in `cell_lines` of drawing.py: [x, y, x, y] each. */
+  cellLines() {
+    if (!this.facts.cells) return [];
+    const [x0, y0, width, height, shift] = this.facts.cells[this.frame], [left, bottom, right, top] = this.facts.limits;
+    const [low, high] = height ? [y0, y0 + height] : [2 * bottom - top, 2 * top - bottom];
+    const [from, to] = width ? [x0, x0 + width] : [2 * left - right, 2 * right - left];
+    const lines = [];
+    if (width) lines.push([from, low, from, high], [to, low, to, high]);
+    if (height) lines.push([from, low, to, low], [from, high, to, high]);
+    const stub = 0.02 * Math.max(width, height);
+    if (shift) lines.push([from + shift, high, from + shift, high + stub], [to - shift, low, to - shift, low - stub]);
+    return lines;
   }
 
   areas() {
@@ -131,7 +172,7 @@ class Run {
       const another = !c || t.first[c] !== t.first[c - 1] || t.second[c] !== t.second[c - 1] ? 1 : 0;
       for (let sign = 1; sign >= -1; sign -= 2) {
         const i = sign > 0 ? t.first[c] : t.second[c];
-        const x = sign * t.fx[c], y = sign * t.fy[c], rx = t.x[c] - this.x[i], ry = t.y[c] - this.y[i];
+        const x = sign * t.fx[c], y = sign * t.fy[c], [rx, ry] = this.arm(i, t.x[c], t.y[c]);
         fx[i] += x;
         fy[i] += y;
         load[i] += t.size[c];
