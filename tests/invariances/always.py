@@ -35,6 +35,10 @@ def momenta(scene, answer):
     """Impulses explain the momentum, but for what bodies bring and take and the border of a sheared cell gives."""
     if {"source", "sink", "sheared", "scheme_gear", "scheme_gear_3_20"} & scene.tags:
         return ""
+    # A stage with another gravity counts anew. The first step from a checkpoint has the acceleration of the run before.
+    if any("gravity" in scene.groups[f"stage.{name}"] for name in scene.named("stage")) or (
+            scene.start == "checkpoint" and {"shaken", "turning", "stages"} & scene.tags):
+        return ""
     balance = answer.balance
     change = np.stack([balance[f"momentum_{axis}"] - balance[f"impulse_{axis}"] for axis in "xy"])
     scale = max(abs(balance[f"{what}_{axis}"]).max() for axis in "xy" for what in ("momentum", "impulse"))

@@ -130,6 +130,11 @@ def frame_difference(scene, answer, case, frame, twin, bound):
     one, two = (np.array(side, dtype=int) for side in zip(*pairs))
     place, velocity = deviations(scene, case, frame, twin, one, two)
     turn = twin.angle[two] - change.sense*frame.angle[one]
+    if case.loose:
+        # A run that starts from a frame counts angles from there.
+        if case.turned is None:
+            case.turned = dict(zip(frame.id[one], turn))
+        turn = turn - np.array([case.turned.get(identifier, 0.0) for identifier in frame.id[one]])
     spin = twin.spin[two] - change.sense/change.time*frame.spin[one]
     tolerances = (bound.place[frame.step] + case.loose*bound.size, bound.velocity[frame.step] + case.loose*bound.speed)
     # Walls that span a periodic axis and fixed bodies with motions are compared, too: by where they are.
@@ -148,7 +153,7 @@ def frame_difference(scene, answer, case, frame, twin, bound):
 def deviations(scene, case, frame, twin, one, two):
     """Differences of places and velocities of rows, in the axes of the scene up to copies."""
     change = case.change
-    time = twin.time + (case.before*scene.dt if case.before else 0.0)
+    time = twin.time + (case.before + scene.prelude)*scene.dt*change.time
     back = np.linalg.inv(change.matrix)/change.length
     place = (twin.position[two] - case.drift*time - change.shift) @ back.T - frame.position[one]
     velocity = ((twin.velocity[two] - case.drift) @ back.T)*change.time - frame.velocity[one]

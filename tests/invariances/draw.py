@@ -100,7 +100,7 @@ class Drawing:
         self.low = np.array([self.uniform(-0.05, 0.05), self.uniform(-0.05, 0.05)])
         size = np.array(cells)*pitch
         if self.container in WITHOUT_WALLS:
-            size = np.maximum(size, 4.3*self.radius)
+            size = np.maximum(size, 4.8*self.radius)
             cells = tuple(int(n) for n in np.maximum(cells, 1))
         self.size = size
         self.down = np.array([0.0, -1.0])
@@ -110,7 +110,7 @@ class Drawing:
             self.new_floor("left", 1)
         elif self.container in ("periodic_x", "periodic_y"):
             axis = "xy".index(self.container[-1])
-            self.size[axis] = max(self.size[axis], 4.3*self.radius)
+            self.size[axis] = max(self.size[axis], 4.8*self.radius)
             if axis == 1:
                 self.down = np.array([-1.0, 0.0])
             scene.put("cell", periodic="xy"[axis], low=list(self.low), size=list(self.size))
@@ -133,11 +133,11 @@ class Drawing:
                     scene.put("cell", shear_ramp=100*scene.dt)
                     scene.tags.add("shear_ramp")
             if self.container == "stress_controlled":
-                scene.put("cell", obeys=self.dice.choice(("x", "y", "xy")), stress=[self.uniform(1e3, 1e4) for _ in "xy"],
-                          mass=self.uniform(0.3, 2), damping_ratio=self.uniform(0.1, 0.5))
+                scene.put("cell", obeys=self.dice.choice(("x", "y", "xy")), stress=[0.0, 0.0], mass=self.uniform(0.3, 2), damping_ratio=self.uniform(0.1, 0.5))
                 if self.dice.random() < 0.3:
                     scene.put("cell", obeys="y", shear_rate=self.uniform(0.5, 3)/self.size[1])
                     scene.tags.add("sheared")
+                scene.put("cell", stress=[self.uniform(1e3, 1e4)*(axis in scene.get("cell", "obeys")) for axis in "xy"])
                 if self.dice.random() < 0.3:
                     scene.put("cell", stress_ramp=80*scene.dt)
                     scene.tags.add("stress_ramp")
@@ -215,7 +215,7 @@ class Drawing:
             entries.update(damping="none")
         else:
             entries.update(damping=damping, damping_coefficient=self.uniform(0.02, 0.2)
-                           if damping != "hunt_crossley" else self.uniform(50, 200))
+                           if damping != "hunt_crossley" else self.uniform(1, 10))
         if damping != "none" and dice.random() < 0.3:
             entries["tilt_damping"] = self.uniform(0, 1)
         if friction != "none":
@@ -226,6 +226,8 @@ class Drawing:
         gravity = strong*direction if self.container not in WITHOUT_WALLS else np.zeros(2)
         if self.container in ("periodic_xy", "sheared") and dice.random() < 0.2:
             gravity = np.array([self.uniform(-50, 50), self.uniform(-50, 50)])
+        if "turning" in self.chosen and not any(gravity):
+            gravity = 20*self.down
         entries["gravity"] = list(gravity)
         scene.put("forces", **entries)
         scene.put("scene", density=self.density)
@@ -385,12 +387,15 @@ class Drawing:
             place = self.low + 0.5*self.size + away*(0.5*self.size[int(abs(away[1]) > 0.5)] + 1.2*self.radius)
             if scene.periodic:
                 place[scene.periodic[0]] = self.low[scene.periodic[0]] + self.uniform(0, 1)*self.size[scene.periodic[0]]
-        slack = 1e-9*half
+        # The program wants room for its circle in the rectangle.
+        wide, interval = math.sqrt(2)*half*(1 + 1e-12), self.dice.choice((20, 40))
+        for axis in scene.periodic:
+            place[axis] = min(max(place[axis], self.low[axis] + 1.001*wide), self.low[axis] + self.size[axis] - 1.001*wide)
         outline = [-half, -half, half, -half, half, half, -half, half]
         velocity = 2*self.down if self.container not in WITHOUT_WALLS else unit(self.uniform(0, 6.28))
-        scene.put("source.feed", low=list(place - half - slack), high=list(place + half + slack), shape="outline",
-                  outline=outline, angle=[0.0, 0.0], velocity=list(velocity), interval=self.dice.choice((20, 40)),
-                  count=len(scene.free) + self.dice.randint(1, 3))
+        scene.put("source.feed", low=list(place - wide), high=list(place + wide), shape="outline",
+                  outline=outline, angle=[0.0, 0.0], velocity=list(velocity), interval=interval,
+                  rate=self.uniform(0.2, 0.9)/(interval*scene.dt))
 
     def add_sink(self):
         scene = self.scene
@@ -426,6 +431,10 @@ class Drawing:
         if {"start_checkpoint", "start_frame"} & self.chosen:
             scene.start = "checkpoint" if "start_checkpoint" in self.chosen else "frame"
             scene.prelude = self.dice.randint(5, 12)*10
+        used = {group.get("wall") for group in scene.groups.values()}
+        for name in scene.named("wall"):
+            if name not in used and "vanish_at" not in scene.groups[f"wall.{name}"]:
+                del scene.groups[f"wall.{name}"]
         scene.size = max(2*body.reach for body in scene.free)
         if not scene.named("stage"):
             scene.put("integrate", duration=scene.steps*scene.dt)
@@ -464,8 +473,6 @@ def draw_impact(dice):
                      fixed=True)
         scene.tags |= {"walls"}
     scene.bodies = [Body(1, pieces, velocity=np.array([0.0, -speed])), below]
-    if below.fixed:
-        scene.put("wall.floor", outline="bodies", bodies=[2])
     scene.size = math.hypot(width, height)
     scene.put("forces", **entries)
     scene.put("scene", density=density)

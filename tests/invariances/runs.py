@@ -112,6 +112,8 @@ def play(program, parts, folder):
                     wall = groups[name]
                     groups[name] = {"outline": "result",
                                     **{key: wall[key] for key in wall if key not in ("outline", "bodies")}}
+            if "obeys" in groups.get("cell", {}):
+                groups["cell"].update(last_cell(folder/before))
         groups.setdefault("output", {}).update(folder=target)
         name = f"{number}_{NAMELIST}"
         write_namelist(folder / name, groups)
@@ -125,6 +127,12 @@ def play(program, parts, folder):
     if answer.code == 0 and not answer.crashed:
         read(folder / before, answer)
     return answer
+
+
+def last_cell(folder):
+    """Entries of a cell that has got another size."""
+    with h5py.File(folder/"trajectory_0001.h5", "r") as file:
+        return {"low": list(file["frames/cell_low"][-1]), "size": list(file["frames/cell_size"][-1])}
 
 
 def one_run(program, folder, name, options):
