@@ -1,0 +1,134 @@
+"""What every answer must have, whatever the scene: balances that close, works, masses, and walls that hold."""
+
+import numpy as np
+
+#: Residual of the energy relative to the greatest kinetic energy or work, and of the momentum. The first is the error of
+#: integration; the second is rounding with velocity Verlet.
+ENERGY, MOMENTUM = 0.1, 1e-9
+#: What the balance says and what the frames give, relative to the greatest
+AGREES = 1e-9
+#: Work of a wall and force times displacement, summed over steps
+WORK = 0.02
+
+
+def faults(scene, answer):
+    """What is wrong with an answer by itself, one text each."""
+    found = []
+    for check in (energies, momenta, kinetic, wall_works, masses, walls_hold):
+        text = check(scene, answer)
+        if text:
+            found.append((check.__name__, text))
+    return found
+
+
+def energies(scene, answer):
+    balance = answer.balance
+    scale = max(balance["kinetic"].max(), *(abs(balance[key]).max() for key in (
+        "elastic_work", "damping_work", "friction_work", "wall_work")))
+    worst = abs(balance["energy_residual"]).max()
+    if worst > ENERGY*scale:
+        return f"energy residual {worst/scale:.1e} of the greatest energy"
+    return ""
+
+
+def momenta(scene, answer):
+    """Impulses explain the momentum, but for what bodies bring and take and the border of a sheared cell gives."""
+    if {"source", "sink", "sheared", "scheme_gear", "scheme_gear_3_20"} & scene.tags:
+        return ""
+    # A stage with another gravity counts anew. The first step from a checkpoint has the acceleration of the run before.
+    if any("gravity" in scene.groups[f"stage.{name}"] for name in scene.named("stage")) or (
+            scene.start == "checkpoint" and {"shaken", "turning", "stages"} & scene.tags):
+        return ""
+    balance = answer.balance
+    change = np.stack([balance[f"momentum_{axis}"] - balance[f"impulse_{axis}"] for axis in "xy"])
+    scale = max(abs(balance[f"{what}_{axis}"]).max() for axis in "xy" for what in ("momentum", "impulse"))
+    scale += sum(answer.mass[body.id] for body in scene.free)*scene.size/(scene.steps*scene.dt)
+    worst = abs(change - change[:, :1]).max()
+    if worst > MOMENTUM*scale:
+        return f"momentum differs by {worst/scale:.1e} from the impulses"
+    return ""
+
+
+def kinetic(scene, answer):
+    """The frames have the kinetic energy of the balance."""
+    values = answer.balance["kinetic"]
+    for k, frame in enumerate(answer.frames):
+        own = sum(0.5*answer.mass[int(i)]*(v @ v) + 0.5*answer.inertia[int(i)]*w*w
+                  for i, v, w in zip(frame.id, frame.velocity, frame.spin) if int(i) not in answer.fixed)
+        if abs(own - values[k]) > AGREES*max(values.max(), own):
+            return f"step {frame.step}: kinetic energy of the bodies {own:.9e}, of the balance {values[k]:.9e} J/m"
+    return ""
+
+
+def wall_works(scene, answer):
+    """Work of a wall that only shifts is its force times its displacement."""
+    series = answer.series
+    for name in scene.named("wall"):
+        if f"{name}.work" not in series or {"motion_rotation", "motion_table", "load_hinged", "motion_conveyor"} & set().union(
+                *(scene.acts.get(k, set()) for k in scene.groups[f"wall.{name}"]["bodies"])):
+            continue
+        work = np.zeros(len(series["time"]))
+        total = np.zeros(len(work))
+        for axis in "xy":
+            force, place = series[f"{name}.force_{axis}"], series[f"{name}.{axis}"]
+            step = 0.5*(force[1:] + force[:-1])*np.diff(place)
+            work[1:] -= np.cumsum(step)
+            total[1:] += np.cumsum(abs(step))
+        own = series[f"{name}.work"] - series[f"{name}.work"][0]
+        kept = np.isfinite(own) & np.isfinite(work)
+        scale = max(total.max(), abs(own[kept]).max(initial=0.0), 1e-300)
+        wrong = abs(own - work)[kept].max(initial=0.0)
+        if wrong > WORK*scale and scale > 1e-3*answer.balance["kinetic"].max():
+            return f"work of wall {name}: {own[-1]:.4e}, force times displacement {work[-1]:.4e} J/m"
+    return ""
+
+
+def masses(scene, answer):
+    """Who was there, entered and has not left is there."""
+    start = {int(k) for k in answer.frames[0].id}
+    gone = {int(k) for k in answer.departures.get("id", ())}
+    last = {int(k) for k in answer.frames[-1].id}
+    for name in scene.named("wall"):
+        vanish = scene.get(f"wall.{name}", "vanish_at", 0.0)
+        if 0 < vanish < answer.frames[-1].time:
+            start -= set(scene.groups[f"wall.{name}"]["bodies"])
+            last -= set(scene.groups[f"wall.{name}"]["bodies"])
+    if not start - gone <= last:
+        return f"bodies {sorted(start - gone - last)} are lost"
+    if gone & last:
+        return f"bodies {sorted(gone & last)} have left and are there"
+    series = answer.series
+    for name in scene.named("sink"):
+        if f"{name}.mass" in series and len(scene.named("sink")) == 1:
+            mass = sum(answer.departures.get("mass", ()))
+            if abs(series[f"{name}.mass"][-1] - mass) > AGREES*max(mass, 1e-300):
+                return f"sink {name}: mass {series[f'{name}.mass'][-1]} in the series, {mass} in the table"
+    entered = sum(int(series[f"{name}.entered"][-1]) for name in scene.named("source") if f"{name}.entered" in series)
+    guests = len((last | gone) - {body.id for body in scene.bodies})
+    if scene.named("source") and not scene.start and entered != guests:
+        return f"{entered} bodies have entered, {guests} were there"
+    return ""
+
+
+def walls_hold(scene, answer):
+    """No centre of a free body is inside a wall."""
+    for frame in answer.frames:
+        fixed = [k for k, i in enumerate(frame.id) if int(i) in answer.fixed]
+        free = [k for k, i in enumerate(frame.id) if int(i) not in answer.fixed]
+        for w in fixed:
+            turn = frame.angle[w]
+            c, s = np.cos(turn), np.sin(turn)
+            place = frame.position[free] - frame.position[w]
+            if frame.size is not None:
+                for axis in scene.periodic:
+                    if "long_wall" not in scene.acts.get(int(frame.id[w]), ()):
+                        place[:, axis] -= np.round(place[:, axis]/frame.size[axis])*frame.size[axis]
+            place = place @ np.array([[c, -s], [s, c]])
+            for piece in answer.outline[int(frame.id[w])]:
+                edge = np.roll(piece, -1, axis=0) - piece
+                inside = ((edge[:, 0]*(place[:, None, 1] - piece[:, 1])
+                           - edge[:, 1]*(place[:, None, 0] - piece[:, 0])) > 0).all(axis=1)
+                if inside.any():
+                    body = int(frame.id[free[int(np.flatnonzero(inside)[0])]])
+                    return f"step {frame.step}: the centre of body {body} is inside wall {int(frame.id[w])}"
+    return ""
