@@ -1,7 +1,11 @@
 """The command line: pictures, tables, help, errors."""
 
 import argparse
+import os
 import re
+import signal
+import subprocess
+import sys
 
 import pytest
 from matplotlib.image import imread
@@ -198,3 +202,15 @@ def test_only_own_pictures_are_replaced(finished, tmp_path, capsys, verb, name):
     assert main([verb, str(finished), "-o", str(path)]) == 0
     assert path.read_bytes() == first
     assert [each.name for each in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("module", ["numpy", "matplotlib"])
+def test_an_interrupt_while_modules_load_ends_a_verb_without_a_traceback(tmp_path, finished, module):
+    """The module that a verb loads next is one that stands for a user who presses Ctrl-C meanwhile."""
+    (tmp_path / f"{module}.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nimport time\n"
+                                           "time.sleep(600)\n", encoding="utf-8")
+    paths = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    done = subprocess.run([sys.executable, "-m", "polydem_post", "plot", str(finished)], capture_output=True, text=True,
+                          env={**os.environ, "PYTHONPATH": paths}, check=False)
+    assert (done.returncode, done.stderr) in [(-signal.SIGINT, ""), (130, "plot: interrupted\n")]
+    assert done.stdout == ""

@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 import warnings
 import zlib
 
@@ -48,6 +50,19 @@ def result(finished, tmp_path):
     shutil.copytree(finished, folder)
     write_manifest(folder, rows_of(folder))
     return folder
+
+
+@pytest.mark.parametrize("name", ["manifest.txt", "trajectory_0002.h5", "profile.h5"])
+def test_a_pipe_in_place_of_a_file_is_named(result, name):
+    """Finds a reader that waits for ever for somebody to write into it."""
+    (result / name).unlink()
+    os.mkfifo(result / name)
+    for words in (["table", result], ["plot", result, "--frame", "-4"]):
+        done = subprocess.run([sys.executable, "-m", "polydem_post", *words], cwd=result.parent, capture_output=True,
+                              text=True, check=False, timeout=600)
+        assert "Traceback" not in done.stderr
+        if name != "profile.h5" or words[0] == "table":
+            assert done.returncode in (2, 3) and f"{name}" in done.stderr, done.stderr
 
 
 def use(folder, **options):

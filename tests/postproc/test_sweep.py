@@ -148,6 +148,7 @@ def test_reads_a_table_as_spreadsheets_write_it(tmp_path):
         ("name,scene.seed\n../x,1\n", 2, "'../x' cannot be a name"),
         ("name,scene.seed\n,1\n", 2, "'' cannot be a name"),
         ('name,scene.seed\na,"1\n', 2, "is not CSV"),
+        ("name,scene.seed\na,1\nb,2\0\n", 3, "holds a byte 0" if sys.version_info >= (3, 11) else "is not CSV"),
         ("name,scene.seed\nm\xfchle,1\n", 0, "is not text in UTF-8 (byte 17); save it in UTF-8"),
         ("name,scene.seed\n\x00,\x80", 0, ""),
     ],

@@ -12,6 +12,7 @@ Each subpackage or module imports only itself and those before it in `LAYERS`. T
 `polydem_lab`; only the command line knows that it is there.
 """
 
+from .base import interrupts  # noqa: F401  the first, before what takes long to load
 from .base.result_file import ResultError
 from .read.contacts import Contacts, Walls
 from .read.frames import Frame

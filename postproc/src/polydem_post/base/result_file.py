@@ -228,8 +228,15 @@ def _identity(path: Path) -> tuple[int, ...] | None:
     return state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
 
 
+def insist_on_file(path: Path) -> None:
+    """Refuse a pipe or a device: whoever opens a pipe without a writer waits for ever."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError(errno.EEXIST, "it is a pipe or a device, no file")
+
+
 def open_hdf5(path: Path) -> h5py.File:
     """Open any HDF5 file to read."""
+    insist_on_file(path)
     try:
         try:
             return h5py.File(path, "r", locking=False)

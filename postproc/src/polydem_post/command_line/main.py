@@ -17,6 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 from .. import __version__
+from ..base import interrupts
 from ..base.emit import printable
 from ..base.result_file import ResultError, is_refused, reason
 from .data_verbs import add_data_verbs
@@ -57,6 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     warnings.showwarning = lambda message, *_: print(f"warning: {printable(str(message))}", file=sys.stderr)
     try:
+        interrupts.raise_exceptions()
         code = options.action(options) or 0
         sys.stdout.flush()
         return code

@@ -14,6 +14,8 @@ import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..base.result_file import insist_on_file
+
 #: Name of the manifest in a result folder
 MANIFEST = "manifest.txt"
 
@@ -54,6 +56,7 @@ class Manifest:
 def read_manifest(folder: Path) -> Manifest | None:
     """The manifest of a result; None if there is none."""
     try:
+        insist_on_file(folder / MANIFEST)
         data = (folder / MANIFEST).read_bytes()
     except FileNotFoundError:
         return None

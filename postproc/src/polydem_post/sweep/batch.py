@@ -24,7 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..base.result_file import ResultError, cannot_read, cannot_write
+from ..base.result_file import ResultError, cannot_read, cannot_write, insist_on_file
 
 TABLE, RUNS = "table.csv", "runs"
 INPUT, OVERRIDES, ATTEMPTS, OUTPUT, RESULT = "input.nml", "overrides.txt", "attempts.csv", "output.txt", "result"
@@ -78,6 +78,7 @@ class Run:
         """The entries that it changes, each group.key=value."""
         path = self.folder / OVERRIDES
         try:
+            insist_on_file(path)
             return path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             raise cannot_read(path, error) from error
@@ -88,6 +89,7 @@ class Run:
         if not path.exists():
             return []
         try:
+            insist_on_file(path)
             with path.open(newline="", encoding="utf-8") as file:
                 return [{"started": row["started"], "seconds": float(row["seconds"]),
                          "exit_code": int(row["exit_code"]), "threads": int(row["threads"])}
@@ -162,6 +164,9 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
             reader = csv.reader(file, strict=True)
             number = 1
             for words in reader:
+                if any("\0" in word for word in words):
+                    raise ResultError(f"{path}:{number}: holds a byte 0, which no value has; save the table as text in "
+                                      "UTF-8")
                 if any(word.strip() for word in words):
                     lines.append((number, [" ".join(word.split()) for word in words]))
                 number = reader.line_num + 1

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-from ..base.result_file import ResultError, reason
+from ..base.result_file import ResultError, insist_on_file, reason
 from ..read.settings import Settings
 from ..read.trajectory import input_of, status_of
 from .batch import ATTEMPTS, INPUT, OUTPUT, Run
@@ -76,6 +76,7 @@ def state_of(run: Run) -> str:
 def is_running(run: Run) -> bool:
     """Whether some process is at a run now: this sweep, another one, or a run that outlived its sweep."""
     try:
+        insist_on_file(run.folder / ATTEMPTS)
         with (run.folder / ATTEMPTS).open("rb") as record:
             fcntl.flock(record, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -88,6 +89,7 @@ def is_running(run: Run) -> bool:
 def lock_holder(result: Path) -> str:
     """Who writes into a result folder, as its lock says: empty if nobody does, or only a process that has ended."""
     try:
+        insist_on_file(result / LOCK)
         words = (result / LOCK).read_text(encoding="utf-8", errors="replace").split()
     except OSError:
         return ""
