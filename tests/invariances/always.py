@@ -37,7 +37,8 @@ def momenta(scene, answer):
         return ""
     # A stage with another gravity counts anew. The first step from a checkpoint has the acceleration of the run before.
     if any("gravity" in scene.groups[f"stage.{name}"] for name in scene.named("stage")) or (
-            scene.start == "checkpoint" and {"shaken", "turning", "stages"} & scene.tags):
+            scene.start == "checkpoint" and (
+                {"shaken", "turning", "stages"} & scene.tags or scene.named("motion") or scene.named("load"))):
         return ""
     balance = answer.balance
     change = np.stack([balance[f"momentum_{axis}"] - balance[f"impulse_{axis}"] for axis in "xy"])

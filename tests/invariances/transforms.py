@@ -49,12 +49,18 @@ class Case:
     impact: bool = False
 
 
-def exceptions():
-    """The table of exceptions: tags (all of them) and the invariance that they break."""
-    rows = re.findall(r"^\| `([\w +]+)` \| ([\w`, ]+) \| .+ \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    if len(rows) < 5:
-        raise ValueError("README.md: the table of exceptions was not understood")
-    return [(frozenset(tags.split(" + ")), name) for tags, names in rows for name in re.findall(r"\w+", names)]
+def read_table(name):
+    """Rows of a table of the page: the capabilities of its first column, and the words of the second."""
+    table = PAGE.read_text(encoding="utf-8").split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
+    rows = re.findall(r"^\| `([\w +]+)` \| ([\w, ]+) \| .+ \|$", table, re.MULTILINE)
+    if len(rows) != table.count("\n|") - 2:
+        raise ValueError(f"README.md: the table of {name} was not understood")
+    return [(frozenset(tags.split(" + ")), word) for tags, words in rows for word in words.split(", ")]
+
+
+def impossible_pairs():
+    """Pairs of capabilities that no scene has."""
+    return {tags | {word} for tags, word in read_table("impossible")}
 
 
 def excepted(scene, name, table):
