@@ -28,6 +28,8 @@ class Bound:
     place: dict = field(default_factory=dict)
     velocity: dict = field(default_factory=dict)
     energy: dict = field(default_factory=dict)
+    #: Sum of the forces on all walls [N/m]
+    force: dict = field(default_factory=dict)
 
     def is_lost(self, step):
         return self.place[step] > LOST*self.size or self.velocity[step] > LOST*self.speed
@@ -68,7 +70,8 @@ def bound_of(scene, answer, disturbed):
     """Bound from runs with other last bits; None if one of them ended otherwise."""
     bound = Bound(scene.size, speed_of(scene, answer))
     scale = max((max(abs(answer.balance[key]).max() for key in ENERGIES)), 1e-300) if answer.balance else 1.0
-    worst = np.zeros(3)
+    worst = np.zeros(4)
+    strongest = max(abs(frame.wall_force).max() for frame in answer.frames)
     others = [{frame.step: (k, frame) for k, frame in enumerate(other.frames)} for other in disturbed]
     for k, frame in enumerate(answer.frames):
         for other, frames in zip(disturbed, others):
@@ -79,15 +82,20 @@ def bound_of(scene, answer, disturbed):
             place, velocity = folded(scene, frame, twin.position - frame.position, twin.velocity - frame.velocity)
             turn, spin = (scene.size*abs(a - b).max() for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
             energy = max(abs(other.balance[key][row] - answer.balance[key][k]) for key in ENERGIES)/scale
-            worst = np.maximum(worst, [max(abs(place).max(), turn), max(abs(velocity).max(), spin), energy])
+            force = abs(twin.wall_force - frame.wall_force).max()
+            worst = np.maximum(worst, [max(abs(place).max(), turn), max(abs(velocity).max(), spin), energy, force])
         bound.place[frame.step] = MARGIN*worst[0] + FLOOR*bound.size
         bound.velocity[frame.step] = MARGIN*worst[1] + FLOOR*bound.speed
         bound.energy[frame.step] = (MARGIN*worst[2] + ENERGY_FLOOR)*scale
+        bound.force[frame.step] = MARGIN*worst[3] + ENERGY_FLOOR*strongest
     return bound
 
 
 def differences(scene, answer, case, other, bound):
-    """The first difference between an answer and that of a transformed scene, as text; '' if there is none."""
+    """The first difference between an answer and that of a transformed scene, as text; '' if there is none.
+
+    None if nothing can be compared, because rounding has grown before.
+    """
     if case.exact:
         return exact_difference(scene, answer, case, other)
     frames = {frame.step + case.before: (k, frame) for k, frame in enumerate(other.frames)}
@@ -101,10 +109,12 @@ def differences(scene, answer, case, other, bound):
         found = frame_difference(scene, answer, case, frame, twin, bound)
         if not found and case.energies:
             found = energy_difference(answer, case, other, k, row, bound.energy[frame.step])
+        if not found and not case.loose and frame.step > case.before:
+            found = force_difference(case, frame, twin, bound.force[frame.step])
         if found:
             return f"step {frame.step}: {found}"
         compared += 1
-    return "" if compared else "nothing was compared"
+    return "" if compared else None
 
 
 def frame_difference(scene, answer, case, frame, twin, bound):
@@ -183,6 +193,15 @@ def energy_difference(answer, case, other, k, row, tolerance):
         start = other.balance[key][0] - unit*answer.balance[key][0] if key != "kinetic" else 0.0
         if not abs(two - start - one) <= tolerance*unit:
             return f"{key} {two:.6e} instead of {one:.6e} J/m (bound {tolerance*unit:.0e})"
+    return ""
+
+
+def force_difference(case, frame, twin, tolerance):
+    """Whether walls bear another force."""
+    force = case.copies*case.change.vector(frame.wall_force, (1, 1, -2))
+    tolerance *= case.copies*case.change.unit((1, 1, -2))
+    if not abs(twin.wall_force - force).max() <= tolerance:
+        return f"walls bear {twin.wall_force} instead of {force} N/m (bound {tolerance:.0e})"
     return ""
 
 

@@ -31,6 +31,9 @@ ALTERNATIVES = [(STARTS, 1), (DRIVEN, 2)]
 CAPABILITIES = (*CONTAINERS, *EXTRAS, "walls", *(f"law_{name}" for name in LAWS),
                 *(f"damping_{name}" for name in DAMPINGS), *(f"friction_{name}" for name in dict.fromkeys(FRICTIONS)),
                 *(f"scheme_{name}" for name in dict.fromkeys(SCHEMES)))
+#: Of these a scene has one each
+EXCLUSIVE = (set(CONTAINERS), STARTS, *({name for name in CAPABILITIES if name.startswith(kind)}
+                                        for kind in ("law_", "damping_", "friction_", "scheme_")))
 #: Every so many seeds, the scene is an impact that is compared by its restitution
 IMPACTS = 8
 
@@ -41,6 +44,11 @@ def draw(seed, impossible):
     if seed % IMPACTS == IMPACTS - 1:
         return draw_impact(dice)
     return Drawing(dice, impossible).scene
+
+
+def alternatives(pair):
+    """Whether two capabilities are alternatives of one choice."""
+    return any(set(pair) <= group for group in EXCLUSIVE)
 
 
 class Drawing:
@@ -467,37 +475,32 @@ class Drawing:
 
 
 def draw_impact(dice):
-    """A body falls centrally on a floor, or two meet: compared by restitution."""
+    """A body or a table on feet falls centrally on a floor or a free body, in flight or to rest under gravity."""
     width, height = dice.uniform(0.01, 0.02), dice.uniform(0.01, 0.02)
-    stiffness, speed = dice.uniform(1e5, 1e6), dice.uniform(0.05, 0.3)
-    scene = Scene(dt=1.0, steps=0, every=20, kind="impact")
-    law = dice.choice(LAWS)
-    entries = {"law": law, "stiffness": stiffness, "damping": "rate", "restitution": dice.uniform(0.2, 0.8),
-               "friction": "none", "gravity": [0.0, 0.0]}
+    stiffness, speed, law = dice.uniform(1e5, 1e6), dice.uniform(0.05, 0.3), dice.choice(LAWS)
+    density, restitution = dice.uniform(1000, 3000), dice.uniform(0.2, 0.8)
+    on_body, feet, rests = dice.random() < 0.35, dice.choice((0, 0, 0, 2, 3)), dice.random() < 0.3
+    scene = Scene(dt=0.01*math.sqrt(density*width*height/stiffness), steps=4000, every=20, kind="impact")
+    gravity = 0.0
+    if rests and not on_body:
+        # A bar on a floor may rock for ever with the other law.
+        scene.kind, scene.steps, law, restitution = "rest", 8000, "conservative", dice.uniform(0.2, 0.4)
+        gravity = -speed/(300*scene.dt)
     scene.tags = {"impact", f"law_{law}", "damping_restitution", "friction_none"}
-    density = dice.uniform(1000, 3000)
-    scene.dt = 0.01*math.sqrt(density*width*height/stiffness)
-    scene.steps = 4000
     place = np.array([dice.uniform(-0.1, 0.1), dice.uniform(-0.1, 0.1)])
-    other = dice.choice(("floor", "body", "table"))
-    if other == "table":
-        pieces, scene.tags = table(width, height, place), scene.tags | {"pieces"}
-    else:
-        pieces = [box(place, place + np.array([width, height]))]
-    middle = place[0] + 0.5*width
-    gap = 20*speed*scene.dt
-    if other == "body":
-        wide = width*dice.uniform(1.0, 2.0)
-        below = Body(2, [box(np.array([middle - 0.5*wide, place[1] - gap - height]),
-                             np.array([middle + 0.5*wide, place[1] - gap]))])
-        scene.tags |= {"body_on_body"}
-    else:
-        below = Body(2, [box(np.array([middle - 0.2, place[1] - gap - 0.05]), np.array([middle + 0.2, place[1] - gap]))],
-                     fixed=True)
-        scene.tags |= {"walls"}
+    top = place + np.array([width, height])
+    pieces = table(feet, place, top) if feet else [box(place, top)]
+    if feet:
+        scene.tags.add("pieces")
+    middle, gap = place[0] + 0.5*width, 20*speed*scene.dt
+    half, deep = (width*dice.uniform(0.5, 1.0), height) if on_body else (0.2, 0.05)
+    below = Body(2, [box(np.array([middle - half, place[1] - gap - deep]), np.array([middle + half, place[1] - gap]))],
+                 fixed=not on_body)
+    scene.tags.add("body_on_body" if on_body else "walls")
     scene.bodies = [Body(1, pieces, velocity=np.array([0.0, -speed])), below]
     scene.size = math.hypot(width, height)
-    scene.put("forces", **entries)
+    scene.put("forces", law=law, stiffness=stiffness, damping="rate", restitution=restitution, friction="none",
+              gravity=[0.0, gravity])
     scene.put("scene", density=density)
     scene.put("integrate", dt=scene.dt, duration=scene.steps*scene.dt)
     scene.put("output", contacts=True, frame_interval=scene.every*scene.dt, frames_per_segment=1000)
@@ -552,8 +555,9 @@ def cut_square(radius):
     return [box(np.array([-half, -half]), np.array([0.2*half, half])), box(np.array([0.2*half, -half]), np.array([half, half]))]
 
 
-def table(width, height, low):
-    """A slab on two feet."""
-    foot, leg = 0.3*width, 0.4*height
-    return [box(low, low + np.array([foot, leg])), box(low + np.array([width - foot, 0]), low + np.array([width, leg])),
-            box(low + np.array([0, leg]), low + np.array([width, height]))]
+def table(feet, low, high):
+    """A slab on feet."""
+    width, leg = (high[0] - low[0])/(2*feet - 1), low[1] + 0.4*(high[1] - low[1])
+    lefts = [low[0] + 2*k*width for k in range(feet)]
+    return [box(np.array([left, low[1]]), np.array([left + width, leg])) for left in lefts] + [
+        box(np.array([low[0], leg]), high)]

@@ -290,7 +290,7 @@ def far_wall(scene, dice):
 # Cuts
 def cut_body(scene, dice):
     """The body that falls is cut into columns or layers of one width."""
-    if scene.kind != "impact" or len(scene.bodies[0].pieces) > 1:
+    if scene.kind == "any" or len(scene.bodies[0].pieces) > 1:
         return None
     other = scene.copy()
     columns, layers = dice.choice(((2, 1), (4, 1), (8, 1), (1, 2), (1, 3), (2, 2), (3, 2)))
@@ -300,7 +300,7 @@ def cut_body(scene, dice):
 
 def cut_wall(scene, dice):
     """What lies below is cut: a floor into several fixed bodies, a free body into pieces."""
-    if scene.kind != "impact":
+    if scene.kind == "any":
         return None
     other = scene.copy()
     n = dice.choice((2, 3))
