@@ -16,6 +16,9 @@ FLOOR = 1e-10
 LOST = 1e-4
 #: Energies differ by this share of the greatest one at most, beside the bound
 ENERGY_FLOOR = 1e-8
+#: Columns of the series that no isometry changes, and those that a turn changes
+SCALARS = ("coordination", "solid_fraction", "unbalanced_force", "kinetic_energy")
+TENSORS = ("stress_xx", "stress_xy", "stress_yx", "stress_yy")
 ENERGIES = ("kinetic", "elastic_work", "damping_work", "friction_work", "wall_work")
 
 
@@ -30,6 +33,8 @@ class Bound:
     energy: dict = field(default_factory=dict)
     #: Sum of the forces on all walls [N/m]
     force: dict = field(default_factory=dict)
+    #: Means of the series, by column and step
+    mean: dict = field(default_factory=dict)
 
     def is_lost(self, step):
         return self.place[step] > LOST*self.size or self.velocity[step] > LOST*self.speed
@@ -88,6 +93,28 @@ def bound_of(scene, answer, disturbed):
         bound.velocity[frame.step] = MARGIN*worst[1] + FLOOR*bound.speed
         bound.energy[frame.step] = (MARGIN*worst[2] + ENERGY_FLOOR)*scale
         bound.force[frame.step] = MARGIN*worst[3] + ENERGY_FLOOR*strongest
+    for key in (*SCALARS, *TENSORS):
+        bound.mean[key] = mean_bound(answer, disturbed, key)
+    return bound
+
+
+def rows_of(answer, key):
+    """A column of the series by step."""
+    if key not in answer.series:
+        return {}
+    return dict(zip(answer.series["step"].tolist(), answer.series[key].tolist()))
+
+
+def mean_bound(answer, disturbed, key):
+    """Bound of a column of the series, by step."""
+    own, others = rows_of(answer, key), [rows_of(other, key) for other in disturbed]
+    scale = np.nanmax(np.abs([*own.values(), 0.0]))
+    worst, bound = 0.0, {}
+    for step, value in own.items():
+        for other in others:
+            if step in other and np.isfinite(value):
+                worst = max(worst, abs(other[step] - value)) if np.isfinite(other[step]) else np.inf
+        bound[step] = MARGIN*worst + ENERGY_FLOOR*scale
     return bound
 
 
@@ -114,7 +141,8 @@ def differences(scene, answer, case, other, bound):
         if found:
             return f"step {frame.step}: {found}"
         compared += 1
-    return "" if compared else None
+    found = mean_difference(answer, case, other, bound) if case.energies and not case.extra else ""
+    return found or ("" if compared else None)
 
 
 def frame_difference(scene, answer, case, frame, twin, bound):
@@ -183,6 +211,23 @@ def match(scene, case, frame, twin, guests, rows):
             best = int(np.argmin(np.hypot(*place.T)))
             pairs.append((k, left.pop(best)))
     return pairs
+
+
+def mean_difference(answer, case, other, bound):
+    """Which mean over bodies or over the sample differs."""
+    change = case.change
+    if change.length != 1 or change.mass != 1 or change.time != 1:
+        return ""
+    same = np.array_equal(change.matrix, np.eye(2))
+    for key in (*SCALARS, *(TENSORS if same else ())):
+        own, others = rows_of(answer, key), rows_of(other, key)
+        for step in sorted(set(own) & set(others)):
+            if bound.is_lost(min(bound.place, key=lambda k: abs(k - step))):
+                break
+            one, two = own[step], others[step]
+            if not abs(two - one) <= bound.mean[key][step] and not (np.isnan(one) and np.isnan(two)):
+                return f"step {step}: {key} {two:.6e} instead of {one:.6e}"
+    return ""
 
 
 def energy_difference(answer, case, other, k, row, tolerance):

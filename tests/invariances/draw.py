@@ -21,7 +21,7 @@ SCHEMES = ("velocity_verlet", "velocity_verlet", "compensated", "gear", "gear_3_
 #: What a scene may have beside container and model of contacts
 EXTRAS = ("materials", "pieces", "motion_constant", "motion_table", "motion_oscillation", "motion_rotation",
           "motion_conveyor", "load", "load_hinged", "gate", "stages", "source", "sink", "cohesion", "rolling", "drag",
-          "local_damping", "shaken", "turning", "start_checkpoint", "start_frame")
+          "local_damping", "shaken", "turning", "start_checkpoint", "start_frame", "until", "sample")
 DRIVEN = {"motion_constant", "motion_table", "motion_oscillation", "motion_rotation", "motion_conveyor", "load",
           "load_hinged"}
 STARTS = {"start_checkpoint", "start_frame"}
@@ -70,7 +70,7 @@ class Drawing:
         self.draw_container()
         self.draw_grains()
         self.draw_forces()
-        for name in sorted(self.chosen, key=lambda name: (name not in DRIVEN, name == "stages", name)):
+        for name in sorted(self.chosen, key=lambda name: (name not in DRIVEN, name in ("stages", "until"), name)):
             getattr(self, f"add_{name}", lambda: None)()
         self.finish()
 
@@ -407,6 +407,40 @@ class Drawing:
             if name.startswith(("motion.", "load.", "source.", "sink.")) and self.dice.random() < 0.4:
                 scene.put(name, stage=self.dice.choice(("first", "second")))
                 scene.tags.add("stage_of_motion" if name[0] in "ml" else "stage_of_traffic")
+
+    def rectangle(self):
+        """A rectangle smaller than the cell, often across its border."""
+        scene, wide = self.scene, self.uniform(0.3, 0.8)*self.size
+        low = self.low + self.size*np.array([self.uniform(0, 1), self.uniform(0, 1)]) - 0.5*wide
+        for axis in scene.periodic:
+            if self.dice.random() < 0.6:
+                low[axis] = self.low[axis] + self.dice.choice((0, 1))*self.size[axis] - wide[axis]*self.uniform(0.2, 0.8)
+        return {"low": list(low), "high": list(low + wide)}
+
+    def add_until(self):
+        """The first stage ends when a condition holds."""
+        scene, dice = self.scene, self.dice
+        if not scene.named("stage"):
+            scene.tags.add("stages")
+            self.add_stages()
+        steps = scene.groups["stage.first"].pop("duration")
+        kinds = ["kinetic", "unbalanced"] + ["count", "solid_fraction"]*(self.container != "stress_controlled") + [
+            "departed"]*("sink" in self.chosen)
+        until = dice.choice(kinds)
+        stage = {"until": until, "longest": 2*steps, "at_limit": "next", "check": 20}
+        side = dice.choice(("below", "above")) if until != "departed" else "above"
+        if until in ("count", "solid_fraction"):
+            stage.update(self.rectangle())
+            limits = {"count": dice.randint(1, 3) + 0.5, "solid_fraction": self.uniform(0.1, 0.7)}
+        else:
+            mass = self.density*2*self.radius**2
+            limits = {"kinetic": mass*self.uniform(0.3, 3), "unbalanced": self.uniform(0.3, 3), "departed": 0.5}
+        stage[side] = limits[until]
+        scene.put("stage.first", **stage)
+        scene.tags.add(f"until_{until}")
+
+    def add_sample(self):
+        self.scene.put("sample", area="rectangle", **self.rectangle())
 
     def add_source(self):
         """A square enters where there is room for one at a place that leaves nothing to chance."""

@@ -45,10 +45,19 @@ class Report:
         self.findings.append(Finding(self.seed, name, self.tags, text))
 
 
+def sparse(scene):
+    """Let a scene have rows of the series at frames only, or none if it has no sample."""
+    output = scene.groups["output"]
+    if "sample" in scene.tags or len(scene.periodic) == 2:
+        output["series_interval"] = output["frame_interval"]
+    else:
+        output.pop("series_interval", None)
+
+
 def disturbed(scene, dice, scale):
     """The scene with other last bits."""
     other = scene.copy()
-    other.groups["output"].pop("series_interval", None)
+    sparse(other)
     speed = max((np.hypot(*body.velocity) for body in scene.free), default=0.0) + scene.size/(scene.steps*scene.dt)
     for body in other.bodies:
         body.move(BITS*scale*np.array([dice.uniform(-1, 1), dice.uniform(-1, 1)]))
@@ -171,7 +180,7 @@ class Beside:
         if name != "split_continue":
             # The series costs a third of a run, and only checks of a run alone need it.
             for part in case.parts:
-                part.scene.groups["output"].pop("series_interval", None)
+                sparse(part.scene)
         other = play(self.choice.program, prelude_of(self.scene, case.parts), self.home/name)
         text = ""
         if other.code != 0:
