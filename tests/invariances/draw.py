@@ -10,71 +10,100 @@ import random
 import numpy as np
 from scene import Body, Scene
 
-#: Spans a cell of three times the largest size, as copies need it
+#: Length of walls that span a cell, also one of three copies of the largest one
 LONG = 0.5
-CONTAINERS = ("plane", "plane", "periodic_x", "periodic_x", "periodic_y", "periodic_xy", "sheared", "sheared",
-              "stress_controlled")
-WITHOUT_WALLS = ("periodic_xy", "sheared", "stress_controlled")
-LAWS = ("conservative", "conservative", "area")
-DAMPINGS = ("restitution", "restitution", "rate", "hunt_crossley", "matuttis_chen", "none")
+CONTAINERS = ("plane", "periodic_x", "periodic_y", "periodic_xy", "sheared", "stress_controlled")
+WITHOUT_WALLS = {"periodic_xy", "sheared", "stress_controlled"}
+LAWS = ("conservative", "area")
+DAMPINGS = ("restitution", "rate", "hunt_crossley", "matuttis_chen", "none")
 FRICTIONS = ("cundall_strack", "cundall_strack", "exact", "none")
-SCHEMES = ("velocity_verlet", "velocity_verlet", "velocity_verlet", "compensated", "gear", "gear_3_20")
+SCHEMES = ("velocity_verlet", "velocity_verlet", "compensated", "gear", "gear_3_20")
 #: What a scene may have beside container and model of contacts
 EXTRAS = ("materials", "pieces", "motion_constant", "motion_table", "motion_oscillation", "motion_rotation",
           "motion_conveyor", "load", "load_hinged", "gate", "stages", "source", "sink", "cohesion", "rolling", "drag",
-          "local_damping", "shaken", "turning", "start_checkpoint", "start_frame")
-NEED_WALLS = {"motion_constant", "motion_table", "motion_oscillation", "motion_rotation", "motion_conveyor", "load",
-              "load_hinged", "gate"}
-#: Walls in a cell do not turn
-NEED_PLANE = {"motion_rotation", "load_hinged"}
+          "local_damping", "shaken", "turning", "start_checkpoint", "start_frame", "until", "sample")
+DRIVEN = {"motion_constant", "motion_table", "motion_oscillation", "motion_rotation", "motion_conveyor", "load",
+          "load_hinged"}
+STARTS = {"start_checkpoint", "start_frame"}
+#: Of what one scene has one or two
+ALTERNATIVES = [(STARTS, 1), (DRIVEN, 2)]
+#: All capabilities, of which each pair that is possible acts on touching bodies
+CAPABILITIES = (*CONTAINERS, *EXTRAS, "walls", *(f"law_{name}" for name in LAWS),
+                *(f"damping_{name}" for name in DAMPINGS), *(f"friction_{name}" for name in dict.fromkeys(FRICTIONS)),
+                *(f"scheme_{name}" for name in dict.fromkeys(SCHEMES)))
+#: Of these a scene has one each
+EXCLUSIVE = (set(CONTAINERS), STARTS, *({name for name in CAPABILITIES if name.startswith(kind)}
+                                        for kind in ("law_", "damping_", "friction_", "scheme_")))
+#: Every so many seeds, the scene is an impact that is compared by its restitution
+IMPACTS = 8
 
 
-def draw(seed):
-    """The scene of a seed."""
+def draw(seed, impossible):
+    """The scene of a seed; `impossible` has the pairs of capabilities that no scene has."""
     dice = random.Random(seed)
-    if seed % 8 == 7:
+    if seed % IMPACTS == IMPACTS - 1:
         return draw_impact(dice)
-    return Drawing(dice).scene
+    return Drawing(dice, impossible).scene
+
+
+def alternatives(pair):
+    """Whether two capabilities are alternatives of one choice."""
+    return any(set(pair) <= group for group in EXCLUSIVE)
 
 
 class Drawing:
     """A scene that is being drawn."""
 
-    def __init__(self, dice):
+    def __init__(self, dice, impossible):
         self.dice = dice
-        self.container = dice.choice(CONTAINERS)
-        self.chosen = self.choose()
+        self.impossible = impossible
+        self.choose()
         self.radius = dice.uniform(4e-3, 7e-3)
-        # At 0.03 of the period of a face on a face
         self.stiffness = dice.uniform(1e5, 5e5)
         self.density = dice.uniform(1000, 3000)
         mass = self.density*2*self.radius**2
         dt = 0.02*math.sqrt(mass/self.stiffness)
-        self.scene = Scene(dt, steps=dice.randint(24, 40)*10, every=10)
+        self.scene = Scene(dt, steps=dice.randint(12, 20)*20, every=20)
         self.scene.tags = {self.container, *self.chosen}
         self.next_id = 1
-        self.floors, self.barriers = [], []
+        self.floors = []
         self.draw_container()
         self.draw_grains()
         self.draw_forces()
-        for name in sorted(self.chosen):
+        for name in sorted(self.chosen, key=lambda name: (name not in DRIVEN, name in ("stages", "until"), name)):
             getattr(self, f"add_{name}", lambda: None)()
         self.finish()
 
     def uniform(self, low, high):
         return self.dice.uniform(low, high)
 
+    def goes(self, name, others):
+        """Whether a capability goes with others."""
+        return not any(frozenset((name, other)) in self.impossible for other in others) and all(
+            name not in group or len(group & set(others)) < most for group, most in ALTERNATIVES)
+
     def choose(self):
-        """Further capabilities that go with the container."""
-        possible = [name for name in EXTRAS
-                    if not (name in NEED_WALLS and self.container in WITHOUT_WALLS)
-                    and not (name in NEED_PLANE and self.container != "plane")
-                    and not (name in ("source", "sink", "turning", "shaken")
-                             and self.container == "stress_controlled")]
-        chosen = set(self.dice.sample(possible, self.dice.randint(1, 4)))
-        if "start_checkpoint" in chosen:
-            chosen.discard("start_frame")
-        return chosen
+        """A pair of capabilities, all pairs alike; what goes with both; a container and a model that do."""
+        dice, every = self.dice, [*CONTAINERS, *EXTRAS]
+        while True:
+            chosen = dice.sample(every, 2)
+            if chosen[0] in CONTAINERS and chosen[1] in CONTAINERS or not self.goes(chosen[1], chosen[:1]):
+                continue
+            containers = [name for name in CONTAINERS if name in chosen] or [
+                name for name in CONTAINERS if all(self.goes(other, [name]) for other in chosen)]
+            if containers:
+                break
+        self.container = dice.choice(containers)
+        extras = [name for name in chosen if name not in CONTAINERS]
+        for name in dice.sample(EXTRAS, dice.randint(1, 4)):
+            if name not in extras and self.goes(name, [*extras, self.container]):
+                extras.append(name)
+        self.chosen = set(extras)
+        self.model = []
+        for kind, names in (("scheme", SCHEMES), ("friction", FRICTIONS), ("damping", DAMPINGS), ("law", LAWS)):
+            possible = [name for name in names
+                        if self.goes(f"{kind}_{name}", [self.container, *extras, *self.model])]
+            self.model.append(f"{kind}_{dice.choice(possible)}")
 
     def new(self, pieces, fixed=False, **how):
         body = Body(self.next_id, [np.asarray(piece, dtype=float) for piece in pieces], fixed, **how)
@@ -94,14 +123,16 @@ class Drawing:
 
     # The container: all grains start in a box from `low` to `high`, and touch `floor` first
     def draw_container(self):
-        cells = (self.dice.randint(2, 4), self.dice.randint(1, 3))
+        cells = [self.dice.randint(2, 4), self.dice.randint(1, 3)]
+        if "source" in self.chosen:
+            # One place is left free.
+            cells[0] = max(cells[0], 3)
         pitch = 2.0*self.radius*self.uniform(0.93, 1.05)
         self.pitch, self.grid = pitch, cells
         self.low = np.array([self.uniform(-0.05, 0.05), self.uniform(-0.05, 0.05)])
         size = np.array(cells)*pitch
         if self.container in WITHOUT_WALLS:
             size = np.maximum(size, 4.8*self.radius)
-            cells = tuple(int(n) for n in np.maximum(cells, 1))
         self.size = size
         self.down = np.array([0.0, -1.0])
         scene = self.scene
@@ -114,22 +145,26 @@ class Drawing:
             if axis == 1:
                 self.down = np.array([-1.0, 0.0])
             scene.put("cell", periodic="xy"[axis], low=list(self.low), size=list(self.size))
-            rows = bool({"load", "motion_constant", "motion_table", "motion_oscillation"} & self.chosen) \
-                and self.dice.random() < 0.7
+            rows = bool({"load", "motion_constant", "motion_table", "motion_oscillation"} & self.chosen) and (
+                self.dice.random() < 0.7)
             if rows:
                 self.new_row("floor", axis)
             else:
                 self.new_floor("floor", axis)
-            if self.dice.random() < 0.5:
+            if self.dice.random() < 0.4 or len(DRIVEN & self.chosen) > 1:
                 self.new_floor("lid", axis, above=True)
         else:
+            if self.container == "periodic_xy" and DRIVEN & self.chosen:
+                self.size[1] += 1.2*self.radius
+                self.new_row("floor", 0)
             scene.put("cell", periodic="xy", low=list(self.low), size=list(self.size))
             if self.container == "sheared":
                 speed = self.uniform(0.5, 3)*self.dice.choice((1, -1))
                 scene.put("cell", shear_rate=speed/self.size[1])
                 if self.dice.random() < 0.6:
                     scene.put("cell", profile=True)
-                if self.dice.random() < 0.3:
+                # A start from a result would let the border stop at once.
+                if self.dice.random() < 0.3 and not {"start_checkpoint", "start_frame"} & self.chosen:
                     scene.put("cell", shear_ramp=100*scene.dt)
                     scene.tags.add("shear_ramp")
             if self.container == "stress_controlled":
@@ -148,7 +183,9 @@ class Drawing:
         low, high = np.empty(2), np.empty(2)
         low[axis], high[axis] = self.low[axis] - 3*self.radius, self.low[axis] + LONG
         thick = self.uniform(1.5, 4)*self.radius
-        face = self.low[across] if not above else self.low[across] + self.size[across]
+        face = self.low[across]
+        if above:
+            face += self.size[across] + 2.6*self.radius*("source" in self.chosen)
         low[across], high[across] = (face, face + thick) if above else (face - thick, face)
         body = self.new([box(low, high)], fixed=True)
         tags = ("long_wall",) if self.scene.groups.get("cell") else ()
@@ -169,9 +206,11 @@ class Drawing:
         self.floors.append(name)
 
     def draw_grains(self):
-        dice, tilt = self.dice, self.uniform(0, 1)
+        tilt = self.uniform(0, 1)
         for i in range(self.grid[0]):
             for j in range(self.grid[1]):
+                if "source" in self.chosen and self.container in WITHOUT_WALLS and (i, j) == (1, 0):
+                    continue
                 place = self.low + (np.array([i, j]) + 0.5)*self.pitch + self.radius*np.array(
                     [self.uniform(-0.05, 0.05), self.uniform(-0.05, 0.05)])
                 pieces = self.shape(place, tilt)
@@ -182,13 +221,12 @@ class Drawing:
                 # No part below the floors
                 if self.container == "plane":
                     body.move(np.maximum(0, self.low - corners(body).min(axis=0) - 0.02*self.radius))
-                elif self.container in ("periodic_x", "periodic_y"):
-                    across = 1 - "xy".index(self.container[-1])
+                elif self.floors:
+                    across = 0 if self.container == "periodic_y" else 1
                     by = np.zeros(2)
                     floor = self.low[across] + ("rows" in self.scene.tags)*0.4*self.radius
                     by[across] = max(0, floor - corners(body).min(axis=0)[across] - 0.02*self.radius)
                     body.move(by)
-        del dice
 
     def shape(self, place, tilt):
         dice, radius = self.dice, self.radius
@@ -199,15 +237,7 @@ class Drawing:
 
     def draw_forces(self):
         dice, scene = self.dice, self.scene
-        law, damping, friction = dice.choice(LAWS), dice.choice(DAMPINGS), dice.choice(FRICTIONS)
-        scheme = dice.choice(SCHEMES)
-        if friction == "exact" and ({"local_damping"} & self.chosen or scheme.startswith("gear")
-                                    or self.container in ("sheared", "stress_controlled")):
-            friction = "cundall_strack"
-        if "materials" in self.chosen and damping in ("hunt_crossley", "matuttis_chen"):
-            damping = "restitution"
-        if scheme == "gear_3_20":
-            damping, friction = "none", "none"
+        scheme, friction, damping, law = (name.split("_", 1)[1] for name in self.model)
         entries = {"law": law, "stiffness": self.stiffness, "friction": friction}
         if damping == "restitution":
             entries.update(damping="rate", restitution=self.uniform(0.1, 0.9))
@@ -234,7 +264,7 @@ class Drawing:
         scene.put("integrate", dt=scene.dt, scheme="velocity_verlet" if scheme == "compensated" else scheme)
         if scheme == "compensated":
             scene.put("integrate", accumulation="compensated")
-        scene.tags |= {f"law_{law}", f"damping_{damping}", f"friction_{friction}", f"scheme_{scheme}"}
+        scene.tags |= set(self.model)
 
     # One method for each capability that needs more than its tag
     def add_materials(self):
@@ -300,7 +330,7 @@ class Drawing:
 
     def add_motion_conveyor(self):
         wall = self.a_wall()
-        if wall is None or len(self.scene.groups[f"wall.{wall}"]["bodies"]) > 1:
+        if wall is None:
             self.drop("motion_conveyor")
             return
         across = 1 if wall in ("floor", "lid") and self.container != "periodic_y" else 0
@@ -356,13 +386,13 @@ class Drawing:
     def add_gate(self):
         """A small wall that some grain touches, until it vanishes."""
         body = self.dice.choice(self.scene.free)
-        place = body.centre + body.reach*0.95*unit(self.uniform(0, 6.28)) + 0.3*self.radius
+        place = body.centre + (0.8*body.reach + 0.15*self.radius)*unit(self.uniform(0, 6.28))
         gate = self.new([regular(place, 0.3*self.radius, 5, self.uniform(0, 1))], fixed=True)
         self.name_wall("gate", [gate], "gate")
         self.scene.put("wall.gate", vanish_at=(self.dice.randint(5, 20)*10 + 0.5)*self.scene.dt)
 
     def add_stages(self):
-        scene, first = self.scene, self.dice.randint(8, 16)*10
+        scene, first = self.scene, self.dice.randint(4, 8)*20
         scene.put("stage.first", duration=first*scene.dt)
         scene.put("stage.second", duration=(scene.steps - first)*scene.dt)
         if self.dice.random() < 0.5:
@@ -378,10 +408,44 @@ class Drawing:
                 scene.put(name, stage=self.dice.choice(("first", "second")))
                 scene.tags.add("stage_of_motion" if name[0] in "ml" else "stage_of_traffic")
 
+    def rectangle(self):
+        """A rectangle smaller than the cell, often across its border."""
+        scene, wide = self.scene, self.uniform(0.3, 0.8)*self.size
+        low = self.low + self.size*np.array([self.uniform(0, 1), self.uniform(0, 1)]) - 0.5*wide
+        for axis in scene.periodic:
+            if self.dice.random() < 0.6:
+                low[axis] = self.low[axis] + self.dice.choice((0, 1))*self.size[axis] - wide[axis]*self.uniform(0.2, 0.8)
+        return {"low": list(low), "high": list(low + wide)}
+
+    def add_until(self):
+        """The first stage ends when a condition holds."""
+        scene, dice = self.scene, self.dice
+        if not scene.named("stage"):
+            scene.tags.add("stages")
+            self.add_stages()
+        steps = scene.groups["stage.first"].pop("duration")
+        kinds = ["kinetic", "unbalanced"] + ["count", "solid_fraction"]*(self.container != "stress_controlled") + [
+            "departed"]*("sink" in self.chosen)
+        until = dice.choice(kinds)
+        stage = {"until": until, "longest": 2*steps, "at_limit": "next", "check": 20}
+        side = dice.choice(("below", "above")) if until != "departed" else "above"
+        if until in ("count", "solid_fraction"):
+            stage.update(self.rectangle())
+            limits = {"count": dice.randint(1, 3) + 0.5, "solid_fraction": self.uniform(0.1, 0.7)}
+        else:
+            mass = self.density*2*self.radius**2
+            limits = {"kinetic": mass*self.uniform(0.3, 3), "unbalanced": self.uniform(0.3, 3), "departed": 0.5}
+        stage[side] = limits[until]
+        scene.put("stage.first", **stage)
+        scene.tags.add(f"until_{until}")
+
+    def add_sample(self):
+        self.scene.put("sample", area="rectangle", **self.rectangle())
+
     def add_source(self):
         """A square enters where there is room for one at a place that leaves nothing to chance."""
         scene, half = self.scene, 0.5*self.radius
-        place = self.low + self.size*np.array([self.uniform(0, 1), self.uniform(0, 1)])
+        place = self.low + np.array([1.5, 0.5])*self.pitch
         if self.container not in WITHOUT_WALLS:
             away = -self.down
             place = self.low + 0.5*self.size + away*(0.5*self.size[int(abs(away[1]) > 0.5)] + 1.2*self.radius)
@@ -401,11 +465,12 @@ class Drawing:
         scene = self.scene
         body = self.dice.choice(scene.free)
         wide = self.uniform(0.6, 1.2)*self.radius
-        low = body.centre + self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
+        ahead = self.uniform(0, 0.7)*scene.steps*scene.dt*body.velocity
+        low = body.centre + ahead + self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
         if scene.periodic and self.dice.random() < 0.6:
             axis = self.dice.choice(scene.periodic)
             low[axis] = self.low[axis] + self.dice.choice((0, 1))*self.size[axis] - wide*self.uniform(0.5, 1.5)
-        scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=self.dice.choice((30, 50, 70)))
+        scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=self.dice.choice((20, 40, 60)))
 
     def add_cohesion(self):
         self.scene.put("forces", cohesion=self.uniform(0.002, 0.02)*self.stiffness)
@@ -430,7 +495,7 @@ class Drawing:
         scene = self.scene
         if {"start_checkpoint", "start_frame"} & self.chosen:
             scene.start = "checkpoint" if "start_checkpoint" in self.chosen else "frame"
-            scene.prelude = self.dice.randint(5, 12)*10
+            scene.prelude = self.dice.randint(3, 6)*20
         used = {group.get("wall") for group in scene.groups.values()}
         for name in scene.named("wall"):
             if name not in used and "vanish_at" not in scene.groups[f"wall.{name}"]:
@@ -444,37 +509,32 @@ class Drawing:
 
 
 def draw_impact(dice):
-    """A body falls centrally on a floor, or two meet: compared by restitution."""
+    """A body or a table on feet falls centrally on a floor or a free body, in flight or to rest under gravity."""
     width, height = dice.uniform(0.01, 0.02), dice.uniform(0.01, 0.02)
-    stiffness, speed = dice.uniform(1e5, 1e6), dice.uniform(0.05, 0.3)
-    scene = Scene(dt=1.0, steps=0, every=20, kind="impact")
-    law = dice.choice(LAWS)
-    entries = {"law": law, "stiffness": stiffness, "damping": "rate", "restitution": dice.uniform(0.2, 0.8),
-               "friction": "none", "gravity": [0.0, 0.0]}
+    stiffness, speed, law = dice.uniform(1e5, 1e6), dice.uniform(0.05, 0.3), dice.choice(LAWS)
+    density, restitution = dice.uniform(1000, 3000), dice.uniform(0.2, 0.8)
+    on_body, feet, rests = dice.random() < 0.35, dice.choice((0, 0, 0, 2, 3)), dice.random() < 0.3
+    scene = Scene(dt=0.01*math.sqrt(density*width*height/stiffness), steps=4000, every=20, kind="impact")
+    gravity = 0.0
+    if rests and not on_body:
+        # A bar on a floor may rock for ever with the other law.
+        scene.kind, scene.steps, law, restitution = "rest", 8000, "conservative", dice.uniform(0.2, 0.4)
+        gravity = -speed/(300*scene.dt)
     scene.tags = {"impact", f"law_{law}", "damping_restitution", "friction_none"}
-    density = dice.uniform(1000, 3000)
-    scene.dt = 0.01*math.sqrt(density*width*height/stiffness)
-    scene.steps = 4000
     place = np.array([dice.uniform(-0.1, 0.1), dice.uniform(-0.1, 0.1)])
-    other = dice.choice(("floor", "body", "table"))
-    if other == "table":
-        pieces, scene.tags = table(width, height, place), scene.tags | {"pieces"}
-    else:
-        pieces = [box(place, place + np.array([width, height]))]
-    middle = place[0] + 0.5*width
-    gap = 20*speed*scene.dt
-    if other == "body":
-        wide = width*dice.uniform(1.0, 2.0)
-        below = Body(2, [box(np.array([middle - 0.5*wide, place[1] - gap - height]),
-                             np.array([middle + 0.5*wide, place[1] - gap]))])
-        scene.tags |= {"body_on_body"}
-    else:
-        below = Body(2, [box(np.array([middle - 0.2, place[1] - gap - 0.05]), np.array([middle + 0.2, place[1] - gap]))],
-                     fixed=True)
-        scene.tags |= {"walls"}
+    top = place + np.array([width, height])
+    pieces = table(feet, place, top) if feet else [box(place, top)]
+    if feet:
+        scene.tags.add("pieces")
+    middle, gap = place[0] + 0.5*width, 20*speed*scene.dt
+    half, deep = (width*dice.uniform(0.5, 1.0), height) if on_body else (0.2, 0.05)
+    below = Body(2, [box(np.array([middle - half, place[1] - gap - deep]), np.array([middle + half, place[1] - gap]))],
+                 fixed=not on_body)
+    scene.tags.add("body_on_body" if on_body else "walls")
     scene.bodies = [Body(1, pieces, velocity=np.array([0.0, -speed])), below]
     scene.size = math.hypot(width, height)
-    scene.put("forces", **entries)
+    scene.put("forces", law=law, stiffness=stiffness, damping="rate", restitution=restitution, friction="none",
+              gravity=[0.0, gravity])
     scene.put("scene", density=density)
     scene.put("integrate", dt=scene.dt, duration=scene.steps*scene.dt)
     scene.put("output", contacts=True, frame_interval=scene.every*scene.dt, frames_per_segment=1000)
@@ -529,8 +589,9 @@ def cut_square(radius):
     return [box(np.array([-half, -half]), np.array([0.2*half, half])), box(np.array([0.2*half, -half]), np.array([half, half]))]
 
 
-def table(width, height, low):
-    """A slab on two feet."""
-    foot, leg = 0.3*width, 0.4*height
-    return [box(low, low + np.array([foot, leg])), box(low + np.array([width - foot, 0]), low + np.array([width, leg])),
-            box(low + np.array([0, leg]), low + np.array([width, height]))]
+def table(feet, low, high):
+    """A slab on feet."""
+    width, leg = (high[0] - low[0])/(2*feet - 1), low[1] + 0.4*(high[1] - low[1])
+    lefts = [low[0] + 2*k*width for k in range(feet)]
+    return [box(np.array([left, low[1]]), np.array([left + width, leg])) for left in lefts] + [
+        box(np.array([low[0], leg]), high)]

@@ -50,6 +50,8 @@ class Frame:
     shift: float = 0.0
     #: Rows of contacts: identifiers of the two bodies
     contacts: np.ndarray = None
+    #: Sum of the forces on all walls [N/m]
+    wall_force: np.ndarray = None
 
     def row(self, identifier):
         found = np.flatnonzero(self.id == identifier)
@@ -187,6 +189,7 @@ def read_frames(file, answer):
         where = contacts["start"][()]
         pairs = np.stack([contacts["first"][()], contacts["second"][()]], axis=1)
     known = {frame.step for frame in answer.frames}
+    force = file["walls/force"][()].sum(axis=1) if "walls" in file else np.zeros((len(step), 2))
     for k in range(len(step)):
         if int(step[k]) in known:
             continue
@@ -198,6 +201,7 @@ def read_frames(file, answer):
             frame.low = group["cell_low"][k] if "cell_low" in group else cell["low"][()]
             frame.size = group["cell_size"][k] if "cell_size" in group else cell["size"][()]
             frame.shift = float(group["shift"][k]) if "shift" in group else 0.0
+        frame.wall_force = force[k]
         if contacts is not None:
             frame.contacts = pairs[where[k]:where[k + 1]]
         answer.frames.append(frame)

@@ -204,6 +204,9 @@ class Scene:
 def map_group(kind, group, change):
     """Map the entries of a group in place."""
     old = dict(group)
+    if old.get("until") == "kinetic":
+        for key in {"below", "above"} & set(old):
+            group[key] = change.unit((2, 1, -2))*old[key]
     for key, value in old.items():
         if f"{kind}.{key}" in PLAIN:
             continue

@@ -12,8 +12,8 @@ import numpy as np
 from runs import Play
 from scene import Body, Map
 
-#: Scenes in which bodies move in a frame that the scene does not state alone
-TRAFFIC = {"source", "sink"}
+#: What has a rectangle that stays where it is
+RECTANGLES = {"source", "sink", "sample", "until_count", "until_solid_fraction"}
 #: Where the page has the table of exceptions
 PAGE = Path(__file__).with_name("README.md")
 
@@ -43,18 +43,24 @@ class Case:
     loose: float = 0.0
     #: Angles by which bodies have turned before a run that starts from a frame
     turned: dict = None
-    #: Whether energies are the same
+    #: Whether energies are the same, and means over the sample
     energies: bool = True
     #: Compared by restitution, not by poses
     impact: bool = False
 
 
-def exceptions():
-    """The table of exceptions: tags (all of them) and the invariance that they break."""
-    rows = re.findall(r"^\| `([\w +]+)` \| ([\w`, ]+) \| .+ \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-    if len(rows) < 5:
-        raise ValueError("README.md: the table of exceptions was not understood")
-    return [(frozenset(tags.split(" + ")), name) for tags, names in rows for name in re.findall(r"\w+", names)]
+def read_table(name):
+    """Rows of a table of the page: the capabilities of its first column, and the words of the second."""
+    table = PAGE.read_text(encoding="utf-8").split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
+    rows = re.findall(r"^\| `([\w +]+)` \| ([\w, ]+) \| .+ \|$", table, re.MULTILINE)
+    if len(rows) != table.count("\n|") - 2:
+        raise ValueError(f"README.md: the table of {name} was not understood")
+    return [(frozenset(tags.split(" + ")), word) for tags, words in rows for word in words.split(", ")]
+
+
+def impossible_pairs():
+    """Pairs of capabilities that no scene has."""
+    return {tags | {word} for tags, word in read_table("impossible")}
 
 
 def excepted(scene, name, table):
@@ -112,8 +118,8 @@ def border(scene, dice):
     rate = scene.get("cell", "shear_rate", 0.0)
     drift = np.array([-rate*by[1], 0.0])
     profile = scene.get("cell", "profile", False)
-    if rate and "sink" in scene.tags:
-        # A sink would move relative to the bodies.
+    if rate and (RECTANGLES - {"source"}) & scene.tags:
+        # Rectangles would move relative to the bodies.
         by[1], drift, low[1] = 0.0, np.zeros(2), scene.get("cell", "low")[1]
         other.put("cell", low=list(low))
     if rate and "shear_ramp" in scene.tags:
@@ -165,7 +171,7 @@ def copies(scene, numbers):
     size, rate = np.array(scene.get("cell", "size")), scene.get("cell", "shear_rate", 0.0)
     profile = scene.get("cell", "profile", False)
     sheared = rate != 0.0 and numbers[1] > 1
-    if sheared and (TRAFFIC & scene.tags or scene.prelude and "shear_ramp" in scene.tags):
+    if sheared and (RECTANGLES & scene.tags or scene.prelude and "shear_ramp" in scene.tags):
         return None
     other = scene.copy()
     jump = 0.0 if "shear_ramp" in scene.tags else rate*size[1]
@@ -197,6 +203,9 @@ def copies(scene, numbers):
             if key in load:
                 load[key] *= n
         load["damping_ratio"] *= np.sqrt(n)
+    for group in other.groups.values():
+        if group.get("until") == "departed":
+            group["above"] *= n
     for kind in ("source", "sink"):
         for name in scene.named(kind):
             group = other.groups.pop(f"{kind}.{name}")
@@ -284,7 +293,7 @@ def far_wall(scene, dice):
 # Cuts
 def cut_body(scene, dice):
     """The body that falls is cut into columns or layers of one width."""
-    if scene.kind != "impact" or len(scene.bodies[0].pieces) > 1:
+    if scene.kind == "any" or len(scene.bodies[0].pieces) > 1:
         return None
     other = scene.copy()
     columns, layers = dice.choice(((2, 1), (4, 1), (8, 1), (1, 2), (1, 3), (2, 2), (3, 2)))
@@ -294,7 +303,7 @@ def cut_body(scene, dice):
 
 def cut_wall(scene, dice):
     """What lies below is cut: a floor into several fixed bodies, a free body into pieces."""
-    if scene.kind != "impact":
+    if scene.kind == "any":
         return None
     other = scene.copy()
     n = dice.choice((2, 3))
@@ -325,7 +334,7 @@ def split_frame(scene, dice):
 
 def split(scene, dice, how):
     """The run ends at a step, and another one goes on from its result."""
-    if scene.start:
+    if scene.start or "until" in scene.tags:
         return None
     step = scene.every*dice.randint(3, scene.steps//scene.every - 3)
     periods = [scene.get(name, "interval") for name in scene.groups if name.startswith(("source.", "sink."))]
@@ -385,19 +394,18 @@ def forget(scene, step):
 
 def split_continue(scene, dice):
     """The run ends early, and goes on by --continue."""
-    first = scene.copy()
-    names = scene.named("stage")
-    if names:
-        if any("stage" in group for group in scene.groups.values()):
-            return None
-        step = round(scene.get(f"stage.{names[0]}", "duration")/scene.dt)
-    else:
-        step = scene.every*dice.randint(3, scene.steps//scene.every - 3)
-    shorten(first, 0, step)
-    parts = [Play(first), Play(scene.copy(), "continue")]
     if scene.start:
         return None
-    return Case(parts, exact=True)
+    first = scene.copy()
+    names = scene.named("stage")
+    if any("stage" in group for group in scene.groups.values()):
+        return None
+    if names:
+        for name in names[1:]:
+            del first.groups[f"stage.{name}"]
+    else:
+        shorten(first, 0, scene.every*dice.randint(3, scene.steps//scene.every - 3))
+    return Case([Play(first), Play(scene.copy(), "continue")], exact=True)
 
 
 def stage_boundary(scene, dice):
@@ -405,7 +413,7 @@ def stage_boundary(scene, dice):
     other = scene.copy()
     names = scene.named("stage")
     used = {group.get("stage") for group in scene.groups.values()}
-    free = [name for name in names if name not in used]
+    free = [name for name in names if name not in used and "duration" in scene.groups[f"stage.{name}"]]
     if names and not free:
         return None
     chosen = dice.choice(free) if names else None
