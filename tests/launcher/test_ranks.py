@@ -163,3 +163,33 @@ class Ranks(Toy):
         self.assertEqual(run.wait(600), 128 + signal.SIGINT)
         self.assertEqual(self.read("heard"), ["USR1", "TERM"])
         self.assertIn("--continue continues from the last checkpoint", run.stderr.read())
+
+    def hanging(self, end, seconds):
+        """Environment of an mpirun that lives so long, whatever its rank does"""
+        return {**self.environment, "MPIRUN_WAITS": f"rank:{end}", "MPIRUN_SECONDS": str(seconds)}
+
+    def test_an_mpirun_that_hangs_after_its_ranks_is_killed(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        killed = "polydem: all ranks had ended, but mpirun had not ten seconds later: it was killed\n"
+        signalled = ("polydem: a signal ended the run; the same command with --continue continues from the last "
+                     "checkpoint\n")
+        # How the rank ends, how long mpirun lives, what the launcher gives and says
+        cases = (("exit 3", 3600, 3, killed),
+                 ("kill -KILL $$", 3600, 137, killed + signalled),
+                 ("exec sleep 15", 14, 0, ""))
+        runs = [subprocess.Popen([self.launcher, "run", "x.nml", "--ranks", "1", "--threads", "1"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                 env=self.hanging(end, seconds)) for end, seconds, _, _ in cases]
+        for run, (end, _, code, messages) in zip(runs, cases):
+            said = run.communicate(timeout=600)[1]
+            self.assertEqual((run.returncode, said), (code, messages), end)
+
+    def test_a_watched_mpirun_keeps_its_number_and_its_streams(self):
+        watcher = os.path.join(self.folder, "src", "packaging", "watch_ranks")
+        words = [watcher, "bash", "-c", "echo $$; exit 5"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as run:
+            self.assertEqual(run.communicate()[0], f"{run.pid}\n")
+        self.assertEqual(run.returncode, 5)
+        words = [watcher, os.path.join(self.folder, "mpi", "mpirun"), "-n", "1"]
+        hung = subprocess.run(words, check=False, timeout=600, env=self.hanging("exit 2", 3600))
+        self.assertEqual(hung.returncode, -signal.SIGKILL)

@@ -58,6 +58,11 @@ env >"$NOTES/environment"
 echo "$2 ranks"
 shift 2
 [ -n "$MPIRUN_WAITS" ] || exec "$@"
+# Its only rank ends so, or lives; it does not look after it.
+if [[ $MPIRUN_WAITS = rank:* ]]; then
+  (export OMPI_COMM_WORLD_RANK=0 && exec bash -c "${MPIRUN_WAITS#*:}") &
+  exec sleep "$MPIRUN_SECONDS"
+fi
 trap 'echo USR1 >>"$NOTES/heard"; [ "$MPIRUN_WAITS" = long ] || { sleep 0.3; exit 75; }' USR1
 trap 'echo TERM >>"$NOTES/heard"; exit 1' TERM
 touch "$NOTES/started"
@@ -79,6 +84,9 @@ MOST_ATTEMPTS = 100
 HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/command_line/help",
                "postproc/src/polydem_lab/command_line/help")
 
+# What ends an mpirun whose ranks have ended
+WATCHER = "src/packaging/watch_ranks"
+
 # What the launcher and the tools may call on a bare machine.
 COMMANDS = ("ar as bash cat cp dirname env find flock grep head id ld ln mkdir mv nproc ranlib readlink rm sed "
             "setsid sh tail true").split()
@@ -92,6 +100,8 @@ class Toy(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
         self.launcher = os.path.join(self.folder, "polydem")
         shutil.copy(LAUNCHER, self.launcher)
+        os.makedirs(os.path.join(self.folder, "src", "packaging"))
+        shutil.copy(os.path.join(os.path.dirname(LAUNCHER), WATCHER), os.path.join(self.folder, WATCHER))
         self.write("CMakeLists.txt", CMAKE_LISTS)
         self.write("CMakePresets.json", PRESETS)
         self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\n")

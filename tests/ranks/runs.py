@@ -15,6 +15,9 @@ from polydem_post.base.columns import field_names
 SERIAL = os.environ["POLYDEM_PROGRAM"]
 PARALLEL = os.environ["POLYDEM_MPI_PROGRAM"]
 
+#: How ranks are started: by an mpirun that ends with them
+MPIRUN = (str(Path(__file__).parents[2] / "src" / "packaging" / "watch_ranks"), "mpirun")
+
 #: All finders, from the table of entries
 FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
                     (Path(__file__).parents[2] / "inputs" / "entries.md").read_text(encoding="utf-8"),
@@ -42,7 +45,7 @@ if os.getuid() == 0:
 
 def start(namelist, folder, ranks=None, threads=1, options=()):
     """Start a run: of the program without MPI if no number of ranks is given."""
-    command = [SERIAL] if ranks is None else ["mpirun", "-n", str(ranks), PARALLEL]
+    command = [SERIAL] if ranks is None else [*MPIRUN, "-n", str(ranks), PARALLEL]
     command += ["run", str(namelist), "--threads", str(threads), "--set", f"output.folder={folder}", *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                             text=True, env=ENVIRONMENT)

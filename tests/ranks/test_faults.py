@@ -13,7 +13,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from runs import ENVIRONMENT, PARALLEL, SERIAL, differences, frames, newest, run, start, state_hash
+from runs import ENVIRONMENT, MPIRUN, PARALLEL, SERIAL, differences, frames, newest, run, start, state_hash
 from scenes import write_scene
 from seals import seal
 
@@ -124,7 +124,7 @@ def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole
 def test_usr1_while_ranks_start_ends_the_run_after_its_first_step(whole, tmp_path):
     folder = tmp_path / "result"
     words = [PARALLEL, "run", str(whole / "scene.nml"), "--threads", "1", "--set", f"output.folder={folder}", *OPTIONS]
-    end = subprocess.run(["mpirun", "-n", "3", sys.executable, "-c", WITH_USR1, *words], env=ENVIRONMENT,
+    end = subprocess.run([*MPIRUN, "-n", "3", sys.executable, "-c", WITH_USR1, *words], env=ENVIRONMENT,
                          capture_output=True, text=True, timeout=600, check=False)
     assert end.returncode == 75 and "interrupted by SIGUSR1 at step 1 of" in end.stderr, end
     finish(whole, folder, 2)
@@ -168,7 +168,7 @@ def test_without_mpirun_the_ranks_end_and_leave_a_good_checkpoint(number, whole,
 
 def test_a_rank_that_never_comes_ends_the_run(whole, tmp_path):
     words = [PARALLEL, "run", str(whole / "scene.nml"), "--set", f"output.folder={tmp_path / 'result'}"]
-    end = subprocess.run(["mpirun", "-n", "2", *words, ":", "-n", "1", "false"], env=ENVIRONMENT, capture_output=True,
+    end = subprocess.run([*MPIRUN, "-n", "2", *words, ":", "-n", "1", "false"], env=ENVIRONMENT, capture_output=True,
                          text=True, timeout=600, check=False)
     assert end.returncode != 0 and end.stderr != ""
     assert not list((tmp_path / "result").glob("*.h5"))
@@ -176,7 +176,7 @@ def test_a_rank_that_never_comes_ends_the_run(whole, tmp_path):
 
 def test_the_program_without_mpi_refuses_to_be_several(whole, tmp_path):
     words = [SERIAL, "run", str(whole / "scene.nml"), "--set", f"output.folder={tmp_path / 'result'}"]
-    end = subprocess.run(["mpirun", "-n", "3", *words], env=ENVIRONMENT, capture_output=True, text=True, timeout=600,
+    end = subprocess.run([*MPIRUN, "-n", "3", *words], env=ENVIRONMENT, capture_output=True, text=True, timeout=600,
                          check=False)
     assert end.returncode == BAD_INPUT and "--ranks 3" in end.stderr, end
     assert not (tmp_path / "result").exists()
@@ -245,7 +245,7 @@ def test_a_contact_that_stops_the_run_stops_all_in_the_same_state(tmp_path):
 def test_an_error_of_the_finder_of_one_rank_reaches_all(ranks):
     build = Path(PARALLEL).parents[2]
     subprocess.run(["cmake", "--build", build, "--target", "faulty_finder"], check=True, stdout=subprocess.PIPE)
-    done = subprocess.run(["mpirun", "-n", str(ranks), build / "tests/simulation/faulty_finder"], env=ENVIRONMENT,
+    done = subprocess.run([*MPIRUN, "-n", str(ranks), build / "tests/simulation/faulty_finder"], env=ENVIRONMENT,
                           timeout=120, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from runs import ENVIRONMENT, PARALLEL
+from runs import ENVIRONMENT, MPIRUN, PARALLEL
 
 #: A scene whose bodies take far more memory than the program and MPI
 BED = """&scene name = 'bed' bodies = 100000 speed = 0.1 /
@@ -26,7 +26,7 @@ def peaks(folder, ranks, bodies):
     measured = folder / f"peaks_of_{ranks}_{bodies}"
     measured.mkdir()
     (folder / "bed.nml").write_text(BED.replace("100000", str(bodies)), encoding="utf-8")
-    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", MEASURE, str(measured),
+    command = [*MPIRUN, "--oversubscribe", "-n", str(ranks), sys.executable, "-c", MEASURE, str(measured),
                PARALLEL, "run", str(folder / "bed.nml"), "--threads", "1", "--set", f"output.folder={results}"]
     subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True, timeout=600)
     return [int(path.read_text(encoding="utf-8")) for path in measured.iterdir()]

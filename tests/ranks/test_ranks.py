@@ -10,6 +10,7 @@ from conftest import Outcome
 from runs import (
     ENVIRONMENT,
     FINDERS,
+    MPIRUN,
     PARALLEL,
     complaints,
     contents,
@@ -163,7 +164,7 @@ def test_bodies_leave_and_enter_alike_on_any_number_of_ranks():
     subprocess.run(["cmake", "--build", build, "--target", "replaced_bodies"], check=True, stdout=subprocess.PIPE)
     told = {}
     for ranks in (1, 2, 3):
-        done = subprocess.run(["mpirun", "-n", str(ranks), build / "tests/simulation/replaced_bodies"],
+        done = subprocess.run([*MPIRUN, "-n", str(ranks), build / "tests/simulation/replaced_bodies"],
                               env=ENVIRONMENT, timeout=300, stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               check=False)
         told[ranks] = (done.returncode, done.stderr, done.stdout)

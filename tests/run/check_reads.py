@@ -117,7 +117,7 @@ class Case:
         """Do a verb; return exit code, standard output, standard error."""
         if words.split()[0] in PYTHON_VERBS:
             return in_python(words.split(), environment, self.data.parent)
-        command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
+        command = [*MPIRUN, "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
         return execute([*command, *words.split()], {**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment},
                        self.data.parent)
 
@@ -298,6 +298,7 @@ if __name__ == "__main__":
     import matplotlib.pyplot  # noqa: F401  the children need not import it
     from polydem_post.command_line.main import main as polydem_post
     from runs import ENVIRONMENT as SURROUNDINGS
+    from runs import MPIRUN
 
     SURROUNDINGS = {name: text for name, text in SURROUNDINGS.items() if name != "LD_PRELOAD"}
     sys.exit(main(sys.argv[1:], __doc__, Case, try_calls))

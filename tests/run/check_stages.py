@@ -15,6 +15,10 @@ import time
 
 from check_continue import BAD_INPUT, FAILED
 
+#: An mpirun that ends with its ranks
+MPIRUN = (os.path.join(os.path.dirname(__file__), "..", "..", "src", "packaging", "watch_ranks"), "mpirun",
+          "--oversubscribe", "--allow-run-as-root")
+
 #: A box with grains and a lid; the step is a power of two, so that times of a stage are exact differences
 SCENE = """\
 &wall name = 'floor' outline = 'rectangle' low = -0.1, -0.02 high = 0.1, 0 /
@@ -77,8 +81,7 @@ class Case:
     def start(self, text, folder, *options, ranks=None, threads=1):
         with open(f"{folder}.nml", "w", encoding="utf-8") as file:
             file.write(text)
-        command = ["mpirun", "--oversubscribe", "--allow-run-as-root", "-n", str(ranks), self.parallel] if ranks else [
-            self.program]
+        command = [*MPIRUN, "-n", str(ranks), self.parallel] if ranks else [self.program]
         command += ["run", f"{folder}.nml", "--threads", str(threads), "--set", f"output.folder={folder}", *options]
         environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
         if ranks and os.path.exists(self.patience):

@@ -75,7 +75,7 @@ class Case:
 
     def run(self, folder, *options, ranks=None, **environment):
         """Run the scene; return exit code, standard output, standard error and seconds."""
-        command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
+        command = [*MPIRUN, "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
         command += ["run", "scene.nml", "--threads", "1", "--set", f"output.folder={folder}", *options]
         began = time.monotonic()
         return *execute(command, {**SURROUNDINGS, **environment}), time.monotonic() - began
@@ -314,7 +314,7 @@ def set_up(words, python_variables=None):
 if __name__ == "__main__":
     set_up(sys.argv)
     from runs import ENVIRONMENT as SURROUNDINGS
-    from runs import frames
+    from runs import MPIRUN, frames
     from seals import seal
 
     sys.exit(main(sys.argv[1:], __doc__, Case, try_calls))

@@ -11,7 +11,8 @@ set(polydem_ranks_environment
 function(polydem_ranks_test name layer target)
   foreach(ranks 1 2 3 4 7)
     add_test(NAME ${name}_${ranks}
-      COMMAND "${MPIEXEC_EXECUTABLE}" ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${ARGN})
+      COMMAND "${PROJECT_SOURCE_DIR}/src/packaging/watch_ranks" "${MPIEXEC_EXECUTABLE}"
+        ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${ARGN})
     set_tests_properties(${name}_${ranks} PROPERTIES
       LABELS "${layer};ranks" ENVIRONMENT "${polydem_ranks_environment}" PROCESSORS 2)
   endforeach()
