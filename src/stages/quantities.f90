@@ -6,6 +6,7 @@ module polydem_quantities
    use polydem_bodies, only: bodies_t
    use polydem_cell, only: cell_t
    use polydem_communicator, only: communicator_t
+   use polydem_contact_resultant, only: find_resultant
    use polydem_contacts, only: contact_force, contacts_t
    use polydem_elementary, only: hypotenuse
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
@@ -166,9 +167,9 @@ contains
    end subroutine solid_fraction
 
    !> Find the mean stress of the contacts in an area: the sum over the contacts of the free bodies in it of the outer
-   !> product of the vector from the centre of the body to the contact and the force on the body, over the area, with
-   !> the sign of soil mechanics: positive in compression. For contacts in equilibrium this is the formula of Love and
-   !> Weber. Collective.
+   !> product of the vector from the centre of the body to the point where the force acts and the force on the body,
+   !> over the area, with the sign of soil mechanics: positive in compression. For contacts in equilibrium this is the
+   !> formula of Love and Weber; it is symmetric unless contacts have a couple. Collective.
    subroutine stress(bodies, contacts, comm, area, tensor)
       type(bodies_t), intent(in) :: bodies
       !> Table of the contacts of this step
@@ -179,13 +180,18 @@ contains
       !> Stress, (direction of the vector, direction of the force) [N/m2]
       real(wp), intent(out) :: tensor(2, 2)
       type(exact_sum_t) :: sums(4)
-      real(wp) :: force(2)
+      real(wp) :: force(2), shift(2), couple
       integer(ip) :: c
+      logical :: has_first, has_second
 
       do c = 1_ip, contacts%n
+         has_first = counts(contacts%first(c))
+         has_second = counts(contacts%second(c))
+         if (.not. (has_first .or. has_second)) cycle
          force = contact_force(contacts, c)
-         if (counts(contacts%first(c))) call add(contacts%arm_first(:, c), force)
-         if (counts(contacts%second(c))) call add(contacts%arm_second(:, c), -force)
+         call find_resultant(bodies, contacts, c, shift, couple)
+         if (has_first) call add(contacts%arm_first(:, c) + shift, force)
+         if (has_second) call add(contacts%arm_second(:, c) + shift, -force)
       end do
       call all_reduce_exact_sums(comm, sums)
       tensor = reshape(-sums%value(), [2, 2])/area%size(1)/area%size(2)

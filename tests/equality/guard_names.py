@@ -101,5 +101,7 @@ PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "sce
                          "integrate.fraction": "integrate.safety_factor", "guards.passing": "guards.tunnelling",
                          "guards.relaxed_depth": "scene.remove_overlap",
                          "checkpoint.elapsed": "checkpoint.wall_interval"},
-                # The settings of a sample, as text
-                data={"sample/case/input": None})
+                # The settings of a sample, as text; points and normals of contacts, and what follows from points
+                data={"sample/case/input": None, "trajectory/contacts/point": None, "trajectory/contacts/normal": None,
+                      **{f"trajectory/series/{name}": None for name in (
+                          "stress_xx", "stress_xy", "stress_yx", "stress_yy", "inertial_number")}})

@@ -175,14 +175,15 @@ def test_contacts_have_indices_and_parts(run):
     assert_array_equal(frame.index_of(contacts.second), contacts.second_index)
     assert_allclose(contacts.normal_vector + contacts.tangential_vector, contacts.force,
                     atol=1e-12 * contacts.force_magnitude.max())
-    assert_allclose(np.sum(contacts.direction**2, axis=1), 1.0)
-    # Repulsion, within the Coulomb limit; the direction is the one in which the first body faces the second.
+    assert_allclose(np.sum(contacts.normal**2, axis=1), 1.0)
+    # Repulsion, within the Coulomb limit; the normal is the direction in which the first body faces the second.
     assert (contacts.normal_force >= 0.0).all()
     assert (np.abs(contacts.tangential_force) <= 0.5 * contacts.normal_force * (1 + 1e-9) + 1e-12).all()
     both = ~contacts.with_fixed
-    assert (np.sum(contacts.direction * contacts.branch, axis=1)[both] < 0.0).all()
+    assert (np.sum(contacts.normal * contacts.branch, axis=1)[both] < 0.0).all()
     assert_allclose(contacts.first_arm - contacts.second_arm, -contacts.branch, atol=1e-15)
     assert (contacts.depth < 0.1 * frame.thickness[frame.free].min()).all()
+    assert_allclose(contacts.area_gradient, contacts.length[:, None] * contacts.normal)
     assert_array_equal(run.contacts(-1).force, contacts.force)
 
 

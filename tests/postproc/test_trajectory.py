@@ -61,7 +61,9 @@ def test_reads_the_contacts_of_every_frame(finished, number):
     assert_array_equal(contacts.second, np.full_like(count, 30))
     assert_array_equal(contacts.area, step + count)
     assert_array_equal(contacts.point, np.column_stack([np.full(len(count), 0.25), count]))
-    assert_array_equal(contacts.normal, np.tile([0.0, 0.125], (len(count), 1)))
+    assert_array_equal(contacts.normal, np.tile([-1.0, 0.0], (len(count), 1)))
+    assert_array_equal(contacts.length, np.full(len(count), 0.125))
+    assert_array_equal(contacts.couple, np.zeros(len(count)))
     assert_array_equal(contacts.force, np.column_stack([count, np.full(len(count), -step)]))
 
 

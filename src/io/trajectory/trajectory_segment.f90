@@ -8,7 +8,7 @@
 !>                  of the cell obeys a stress)
 !>     /walls       id; force and torque on the fixed bodies, and present if walls vanish: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
-!>                  normal, force: one row per contact (optional)
+!>                  normal, length, force, couple: one row per contact (optional)
 !>     /energy_balance      energy balance: one data set per entry, one row per frame (optional)
 !>     /series      step, time and named values: one data set per column, one row per step of the series up to the last
 !>                  frame of the segment (optional)
@@ -16,20 +16,22 @@
 !>
 !> If bodies enter or leave, /bodies and /frames have another form (`polydem_ragged_segment`).
 !>
-!> Indices count from 0. The normal of a contact is the integral of the outward normal over the part of the outline of
-!> the first body that is inside the second body. The force of a contact acts on the first body.
+!> Indices count from 0. Length times normal of a contact is the integral of the outward normal over the part of the
+!> outline of the first body that is inside the second body. Force and couple of a contact act on the first body, the
+!> force at the point (`polydem_contact_resultant`).
 !>
 !> All ranks write a segment collectively. Each rank writes a block of rows in ascending order of identifiers. All
 !> procedures are collective.
 module polydem_trajectory_segment
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
+   use polydem_contact_resultant, only: find_resultant
    use polydem_contacts, only: contact_force, contacts_t
    use polydem_errors, only: error_t
    use polydem_frame_poses, only: write_poses
    use polydem_row_distribution, only: component, row_distribution_t, vector
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
-   use polydem_kinds, only: bp, dp, ip, lp
+   use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs, order_vertices
    use polydem_series, only: series_t
@@ -227,17 +229,21 @@ contains
       type(part_t) :: part
       integer(lp), allocatable :: ids(:, :), pairs(:, :)
       real(dp), allocatable :: values(:, :), block(:, :)
+      real(wp) :: shift(2), couple
       integer(ip) :: c
 
       associate (n => contacts%n)
-         allocate (ids(2, n), values(7, n))
+         allocate (ids(2, n), values(9, n))
          do c = 1_ip, n
             ids(1, c) = int(bodies%id(contacts%first(c)), lp)
             ids(2, c) = int(bodies%id(contacts%second(c)), lp)
+            call find_resultant(bodies, contacts, c, shift, couple)
             values(1, c) = real(contacts%area(c), dp)
-            values(2:3, c) = real(bodies%position(:, contacts%first(c)) + contacts%arm_first(:, c), dp)
-            values(4:5, c) = real(contacts%normal(:, c), dp)
-            values(6:7, c) = real(contact_force(contacts, c), dp)
+            values(2:3, c) = real(bodies%position(:, contacts%first(c)) + (contacts%arm_first(:, c) + shift), dp)
+            values(4:5, c) = real(-contacts%direction(:, c), dp)
+            values(6, c) = real(sqrt(contacts%normal(1, c)**2 + contacts%normal(2, c)**2), dp)
+            values(7:8, c) = real(contact_force(contacts, c), dp)
+            values(9, c) = real(couple, dp)
          end do
          call order_pairs(comm, bodies, contacts%first(:n), contacts%second(:n), blocks)
       end associate
@@ -256,13 +262,17 @@ contains
                       rows=many_rows)
       call file%write('/contacts/area', component(block, 1), error, 'm2', &
                       'area of the overlap; with the conservative law its effective area', part, rows=many_rows)
-      call file%write('/contacts/point', vector(block, 2), error, 'm', 'centroid of the overlap in the world', &
-                      part, rows=many_rows)
-      call file%write('/contacts/normal', vector(block, 4), error, 'm', &
-                      'integral of the outward normal over the outline of first inside second, '// &
-                      'the gradient of that area', part, rows=many_rows)
-      call file%write('/contacts/force', vector(block, 6), error, 'N/m', &
+      call file%write('/contacts/point', vector(block, 2), error, 'm', &
+                      'point within both bodies where the force acts, in the world', part, rows=many_rows)
+      call file%write('/contacts/normal', vector(block, 4), error, '1', 'unit normal from the first body into the '// &
+                      'second', part, rows=many_rows)
+      call file%write('/contacts/length', component(block, 6), error, 'm', &
+                      'length of the contact; that area has the gradient length times normal', part, rows=many_rows)
+      call file%write('/contacts/force', vector(block, 7), error, 'N/m', &
                       'force on the first body; the second feels the opposite', part, rows=many_rows)
+      call file%write('/contacts/couple', component(block, 9), error, 'N', &
+                      'torque on the first body besides that of the force; the second feels the opposite', part, &
+                      rows=many_rows)
    end subroutine add_contacts
 
    !> Add a row of the energy balance.

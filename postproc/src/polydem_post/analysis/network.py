@@ -93,8 +93,8 @@ def fabric_tensor(frame: Frame, chosen: Any = None) -> FloatArray:
     All contacts count unless `chosen` selects some (M. Satake, Proc. IUTAM Conf. Deformation and Failure of Granular
     Materials, Delft (1982) 63).
     """
-    return _mean_dyad(_chosen(frame, chosen, frame.contacts.direction), _chosen(frame, chosen,
-                                                                                frame.contacts.direction))
+    normal = _chosen(frame, chosen, frame.contacts.normal)
+    return _mean_dyad(normal, normal)
 
 
 @dataclass(frozen=True)
@@ -127,14 +127,14 @@ def anisotropy(frame: Frame, chosen: Any = None) -> Anisotropy:
     positive. All contacts count unless `chosen` selects some.
     """
     contacts = frame.contacts
-    direction, force = (_chosen(frame, chosen, each) for each in (contacts.direction, -contacts.force))
-    normal = np.sum(force * direction, axis=1)
-    if normal.sum() == 0.0:
+    normal, force = (_chosen(frame, chosen, each) for each in (contacts.normal, -contacts.force))
+    size = np.sum(force * normal, axis=1)
+    if size.sum() == 0.0:
         raise ResultError(f"no contact of step {frame.step} has a normal force")
-    fabric = _mean_dyad(direction, direction)
+    fabric = _mean_dyad(normal, normal)
     of_contacts = 2.0 * _difference(fabric)
-    of_normals = 2.0 * _difference(_mean_dyad(normal[:, None] * direction, direction)) - of_contacts
-    of_all = 2.0 * _difference(_mean_dyad(force, direction))
+    of_normals = 2.0 * _difference(_mean_dyad(size[:, None] * normal, normal)) - of_contacts
+    of_all = 2.0 * _difference(_mean_dyad(force, normal))
     angle = 0.5 * float(np.arctan2(2.0 * fabric[0, 1], fabric[0, 0] - fabric[1, 1]))
     return Anisotropy(of_contacts, of_normals, of_all - of_contacts - of_normals, angle)
 

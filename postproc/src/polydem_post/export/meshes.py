@@ -61,7 +61,8 @@ def contact_data(frame: Frame) -> Columns:
         "first": contacts.first.astype(np.int32), "second": contacts.second.astype(np.int32),
         "force": in_space(contacts.force), "normal_force": contacts.normal_force,
         "tangential_force": contacts.tangential_force, "overlap_area": contacts.area,
-        "point": in_space(contacts.point), "normal": in_space(contacts.direction),
+        "point": in_space(contacts.point), "normal": in_space(contacts.normal), "length": contacts.length,
+        "couple": contacts.couple,
         "with_fixed": contacts.with_fixed.astype(np.int32)}
 
 

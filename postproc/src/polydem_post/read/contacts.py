@@ -18,16 +18,20 @@ class Contacts:
     """The overlapping pairs of bodies at one time: m contacts; SI units with unit depth.
 
     The first body of a contact is the one with the lower identifier. A contact acts on its first body; its second body
-    feels the opposite force.
+    feels the opposite force and couple.
 
     Read from the file:
 
         first         [1]    identifier of the first body, (m)
         second        [1]    identifier of the second body, (m)
         area          [m2]   area of the overlap; with forces.law = 'conservative' its effective area, (m)
-        point         [m]    centroid of the overlap, where the force acts, (m, 2)
-        normal        [m]    integral of the outward normal over the outline of first inside second, (m, 2)
+        point         [m]    point within both bodies where the force acts, (m, 2)
+        normal        [1]    unit vector across the contact, from the first body into the second, (m, 2)
+        length        [m]    length of the contact; 0 without direction, as of one body inside the other, (m)
         force         [N/m]  force on the first body, (m, 2)
+        couple        [N]    torque on the first body besides that of the force at the point, mostly 0, (m)
+
+    In results of file layouts before 7 the point is the centroid of the overlap, and the couple is not known: NaN.
 
     Found from the bodies of the frame:
 
@@ -44,7 +48,9 @@ class Contacts:
     area: FloatArray
     point: FloatArray
     normal: FloatArray
+    length: FloatArray
     force: FloatArray
+    couple: FloatArray
     first_index: IntArray
     second_index: IntArray
     branch: FloatArray
@@ -71,36 +77,28 @@ class Contacts:
         return first
 
     @cached_property
-    def length(self) -> FloatArray:
-        """Length of each contact [m], (m): magnitude of `normal`."""
-        return np.hypot(self.normal[:, 0], self.normal[:, 1])
-
-    @cached_property
     def depth(self) -> FloatArray:
-        """Mean depth of each overlap [m], (m): area over length; infinite for a contact without direction."""
-        with np.errstate(divide="ignore"):
-            return np.where(self.length > 0.0, self.area / np.where(self.length > 0.0, self.length, 1.0), np.inf)
+        """Mean depth of each overlap [m], (m): area over length; infinite for an overlap without length."""
+        endless = np.where(self.area > 0.0, np.inf, 0.0)
+        return np.divide(self.area, self.length, out=endless, where=self.length > 0.0)
 
-    @cached_property
-    def direction(self) -> FloatArray:
-        """Unit vector of each normal, from the first body into the second [1], (m, 2).
+    @property
+    def area_gradient(self) -> FloatArray:
+        """Integral of the outward normal over the outline of first inside second, as was `normal` once [m], (m, 2).
 
-        A contact without a normal (one body inside the other) has the direction of the line of centres, as in the
-        program.
+        It is the gradient of the area when the first body moves, length times normal.
         """
-        way = np.where(self.length[:, None] > 0.0, self.normal, -self.branch)
-        size = np.hypot(way[:, 0], way[:, 1])[:, None]
-        return np.divide(way, size, out=np.zeros_like(way), where=size > 0.0)
+        return self.length[:, None] * self.normal
 
     @cached_property
     def tangent(self) -> FloatArray:
-        """Unit vector of each tangent: the direction turned by a right angle anticlockwise [1], (m, 2)."""
-        return np.column_stack([-self.direction[:, 1], self.direction[:, 0]])
+        """Unit vector of each tangent: the normal turned by a right angle anticlockwise [1], (m, 2)."""
+        return np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
 
     @cached_property
     def normal_force(self) -> FloatArray:
         """Normal part of each force; positive: the bodies repel each other [N/m], (m)."""
-        return -np.einsum("ij,ij->i", self.force, self.direction)
+        return -np.einsum("ij,ij->i", self.force, self.normal)
 
     @cached_property
     def tangential_force(self) -> FloatArray:
@@ -110,7 +108,7 @@ class Contacts:
     @cached_property
     def normal_vector(self) -> FloatArray:
         """Normal part of each force on the first body as a vector [N/m], (m, 2)."""
-        return -self.normal_force[:, None] * self.direction
+        return -self.normal_force[:, None] * self.normal
 
     @cached_property
     def tangential_vector(self) -> FloatArray:

@@ -18,7 +18,10 @@ from .contacts import Contacts, Walls
 from .tables import body_table
 
 #: What a contact has of its own; the rest follows from the bodies
-CONTACT_FIELDS = ("first", "second", "area", "point", "normal", "force")
+CONTACT_FIELDS = ("first", "second", "area", "point", "normal", "length", "force", "couple")
+#: Those of them that files have from this layout on
+NEW_CONTACT_FIELDS = ("length", "couple")
+CONTACT_LAYOUT = 7
 
 #: Distances of vertices that are held in memory at once
 MOST_DISTANCES = 2**20
@@ -136,22 +139,22 @@ class Frame:
             mass=np.where(held, np.inf, density * np.abs(area)),
             inertia=np.where(held, np.inf, density * np.abs(second)))
 
-    def with_contacts(self, first: Any, second: Any, force: Any, point: Any, normal: Any = None,
-                      area: Any = None) -> Frame:
+    def with_contacts(self, first: Any, second: Any, force: Any, point: Any, normal: Any = None, area: Any = None,
+                      length: Any = None, couple: Any = None) -> Frame:
         """The same frame with contacts of these identifiers, (m) each.
 
-        `force` on the first body [N/m] and `point` [m] are (m, 2). `normal` [m], (m, 2), is the unit vector of the line
-        of centres and `area` [m2], (m), is 0, unless they are given.
+        `force` on the first body [N/m] and `point` [m] are (m, 2). `normal`, (m, 2), is the direction of the line of
+        centres; `area` [m2], `length` [m] and `couple` on the first body [N], (m), are 0, unless they are given.
         """
         names = np.asarray(first), np.asarray(second)
         index = [_index_of(self, each) for each in names]
         line = self.position[index[1]] - self.position[index[0]]
-        unit = line / np.hypot(line[:, 0], line[:, 1])[:, None]
         contacts = find_contacts(self, {
             "first": names[0], "second": names[1], "force": np.asarray(force, dtype=float).reshape(-1, 2),
             "point": np.asarray(point, dtype=float).reshape(-1, 2),
-            "normal": unit if normal is None else np.asarray(normal, dtype=float).reshape(-1, 2),
-            "area": np.zeros(len(names[0])) if area is None else np.asarray(area, dtype=float)})
+            "normal": unit_vectors(line if normal is None else np.asarray(normal, dtype=float).reshape(-1, 2)),
+            **{name: np.zeros(len(names[0])) if given is None else np.asarray(given, dtype=float)
+               for name, given in (("area", area), ("length", length), ("couple", couple))}})
         return replace(self, _source=_Given(contacts))
 
     @cached_property
@@ -319,13 +322,24 @@ class Frame:
         """Sum of the contact forces on each body, without gravity [N/m], (n, 2).
 
         Of free bodies it is the sum over the stored contacts, which the run must have written; of fixed bodies the
-        stored load of walls. Torques of free bodies are not stored, and do not follow from the contacts alone: with
-        tilt damping or the conservative law a contact has a torque of its own.
+        stored load of walls.
         """
         total = np.zeros((len(self), 2))
         np.add.at(total, self.contacts.first_index, self.contacts.force)
         np.subtract.at(total, self.contacts.second_index, self.contacts.force)
         total[_index_of(self, self.walls.id)] = self.walls.force
+        return total
+
+    @cached_property
+    def torque(self) -> FloatArray:
+        """Sum of the torques of contacts on each body about its centre of mass [N], (n), from what `force` needs.
+
+        In results of file layouts before 7 it is NaN for free bodies with contacts, whose couples are not known.
+        """
+        total, contacts = np.zeros(len(self)), self.contacts
+        np.add.at(total, contacts.first_index, _cross(contacts.first_arm, contacts.force) + contacts.couple)
+        np.subtract.at(total, contacts.second_index, _cross(contacts.second_arm, contacts.force) + contacts.couple)
+        total[_index_of(self, self.walls.id)] = self.walls.torque
         return total
 
     @cached_property
@@ -376,16 +390,34 @@ class _Given:
 
 
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
-    """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0."""
+    """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0.
+
+    Columns of file layouts before 7 have no length and no couple, and the area gradient as normal.
+    """
     first, second = (_index_of(frame, columns[name]) for name in ("first", "second"))
     branch = frame.position[first] - frame.position[second]
     first_arm, second_arm = (columns["point"] - frame.position[rows] for rows in (first, second))
     if frame.cell_size.any():
         branch = frame.nearest(first, second, branch)
         second_arm = first_arm + branch
+    if "length" not in columns:
+        length = np.hypot(*columns["normal"].T)
+        # A contact without direction, one body inside the other, has that of the line of centres, as in the program.
+        way = np.where(length[:, None] > 0.0, columns["normal"], -branch)
+        columns = {**columns, "length": length, "normal": unit_vectors(way), "couple": np.full(len(first), np.nan)}
     return Contacts(
         **{name: columns[name] for name in CONTACT_FIELDS}, first_index=first, second_index=second, branch=branch,
         first_arm=first_arm, second_arm=second_arm, with_fixed=frame.fixed[first] | frame.fixed[second])
+
+
+def unit_vectors(vectors: FloatArray) -> FloatArray:
+    """Vectors of length 1 along others, (k, 2); 0 where these are 0."""
+    size = np.hypot(vectors[:, 0], vectors[:, 1])[:, None]
+    return np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
 
 def _index_of(frame: Frame, identifiers: npt.NDArray[np.integer[Any]]) -> IntArray:

@@ -26,8 +26,8 @@ BODY_COLUMNS = ("fixed", "position", "angle", "velocity", "angular_velocity", "m
 MOVING_COLUMNS = ("position", "angle", "velocity", "angular_velocity")
 
 #: Columns of contacts in tables
-CONTACT_COLUMNS = ("first", "second", "first_index", "second_index", "area", "depth", "point", "normal", "force",
-                   "normal_force", "tangential_force", "branch", "with_fixed")
+CONTACT_COLUMNS = ("first", "second", "first_index", "second_index", "area", "depth", "point", "normal", "length",
+                   "force", "couple", "normal_force", "tangential_force", "branch", "with_fixed")
 
 
 def need(package: str, extra: str, purpose: str) -> Any:

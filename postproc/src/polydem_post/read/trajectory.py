@@ -24,7 +24,7 @@ from ..base.result_file import (
     series_of,
 )
 from .contacts import Contacts, Walls
-from .frames import CONTACT_FIELDS, Frame, find_contacts, sound_frame
+from .frames import CONTACT_FIELDS, CONTACT_LAYOUT, NEW_CONTACT_FIELDS, Frame, find_contacts, sound_frame
 from .result_folder import ResultFolder
 from .segments import FrameRows, Segment
 from .settings import Settings
@@ -399,9 +399,10 @@ class Trajectory:
                 raise ResultError(f"{segment.path}: holds no contacts; run with output.contacts = .true.")
             group = file["contacts"]
             low, high = (int(each) for each in group["start"][row : row + 2])
-            columns = {name: group[name][low:high] for name in CONTACT_FIELDS}
-            shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else []))
-                      for name in CONTACT_FIELDS}
+            is_new = int(file.attrs["schema_version"]) >= CONTACT_LAYOUT
+            names = [name for name in CONTACT_FIELDS if is_new or name not in NEW_CONTACT_FIELDS]
+            columns = {name: group[name][low:high] for name in names}
+            shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else [])) for name in names}
             insist(segment.path, "contacts", columns, shapes)
         if self._shift is not None:
             columns["point"] = columns["point"] + self._shift
