@@ -14,7 +14,7 @@ module polydem_bodies_in_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: set_cell, change_cell, find_folds, stretch_bodies, wrap_bodies, put_into_cell, path_of
+   public :: set_cell, change_cell, find_folds, stretch_bodies, wrap_bodies, put_into_cell, add_profile, path_of
 
 contains
 
@@ -129,39 +129,59 @@ contains
       end do
    end subroutine wrap_bodies
 
-   !> Move a body that crosses the upper or lower border of a sheared cell to the place and velocity of its copy.
+   !> Move a body that crosses the upper or lower border of a sheared cell to the place and velocity of its copy: those
+   !> at the start of the step.
    pure subroutine cross_sheared_border(bodies, s, crossed)
       type(bodies_t), intent(inout) :: bodies
       !> Slot of the body
       integer(ip), intent(in) :: s
-      !> 1 if it crosses the upper border, -1 if it crosses the lower one
+      !> Number of cells by which it goes up, at most one within a step
       integer(ip), intent(in) :: crossed
 
       associate (cell => bodies%cell, times => real(crossed, wp))
          bodies%position(1, s) = bodies%position(1, s) - times*cell%former_shift
          bodies%velocity(1, s) = bodies%velocity(1, s) - times*cell%former_jump
-         bodies%slid(s) = bodies%slid(s) + times*cell%former_shift
+         if (allocated(bodies%slid)) bodies%slid(s) = bodies%slid(s) + times*cell%former_shift
       end associate
    end subroutine cross_sheared_border
 
    !> Put bodies that may be anywhere into the cell. Those that span it stay where they are.
    pure subroutine put_into_cell(bodies, slots)
-      !> Bodies after `find_folds`; `position` changes, and `image` is set to the number of cells that were crossed
+      !> Bodies after `find_folds`; `position` and `image` change, in a sheared cell also `velocity` and `slid`
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
-      integer(ip) :: k
+      integer(ip) :: k, crossed
       integer :: axis
 
       do k = 1_ip, size(slots, kind=ip)
-         do axis = 1, 2
-            associate (s => slots(k), cell => bodies%cell)
-               bodies%image(s, axis) = &
-                  floor((bodies%position(axis, s) - cell%low(axis))*bodies%folds(axis, s), ip)
-               bodies%position(axis, s) = bodies%position(axis, s) - real(bodies%image(s, axis), wp)*cell%size(axis)
-            end associate
-         end do
+         associate (s => slots(k), cell => bodies%cell)
+            do axis = 2, 1, -1
+               crossed = floor((bodies%position(axis, s) - cell%low(axis))*bodies%folds(axis, s), ip)
+               bodies%position(axis, s) = bodies%position(axis, s) - real(crossed, wp)*cell%size(axis)
+               bodies%image(s, axis) = bodies%image(s, axis) + crossed
+               if (crossed /= 0_ip .and. axis == 2) call cross_sheared_border(bodies, s, crossed)
+            end do
+         end associate
       end do
    end subroutine put_into_cell
+
+   !> Give bodies the velocity of a shear at their height.
+   pure subroutine add_profile(bodies, rate, slots)
+      !> Bodies in the cell; `velocity` changes
+      type(bodies_t), intent(inout) :: bodies
+      !> Rate of the shear [1/s]
+      real(wp), intent(in) :: rate
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      integer(ip) :: k
+
+      do k = 1_ip, size(slots, kind=ip)
+         associate (s => slots(k), cell => bodies%cell)
+            bodies%velocity(1, s) = bodies%velocity(1, s) + rate* &
+               (bodies%position(2, s) - (cell%low(2) + 0.5_wp*cell%size(2)))
+         end associate
+      end do
+   end subroutine add_profile
 
 end module polydem_bodies_in_cell

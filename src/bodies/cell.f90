@@ -12,7 +12,8 @@ module polydem_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: cell_t, cell_load_t, new_cell, grow_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y
+   public :: cell_t, cell_load_t, new_cell, grow_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y, &
+             shear_flow, into_cell, copies_within
 
    !> What makes the size of a cell obey a stress, (x and y)
    type :: cell_load_t
@@ -59,7 +60,7 @@ module polydem_cell
       real(wp) :: first_shift = 0.0_wp
       !> Displacement of the copy above, from 0 to the width [m], and its velocity [m/s]
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
-      !> Both at the start of the step
+      !> Both at the start of the step; before the first one those of the state from which bodies enter the cell
       real(wp) :: former_shift = 0.0_wp, former_jump = 0.0_wp
       !> The stress that its size obeys; not allocated if the size is constant
       type(cell_load_t), allocatable :: load
@@ -67,6 +68,8 @@ module polydem_cell
 
    !> A number of such size that adding it rounds to whole numbers
    real(wp), parameter :: rounder = 1.5_wp*2.0_wp**(digits(1.0_wp) - 1)
+   !> Difference of two lengths that count as the same
+   real(wp), parameter :: same_length = 1.0e-6_wp
 
 contains
 
@@ -170,6 +173,69 @@ contains
       nearest(1) = vector(1) - copies*cell%shift
       nearest(1) = nearest(1) - rounded(nearest(1)*folds(1))*cell%size(1)
    end function nearest_copy
+
+   !> Motion of the shear at a height: velocity along x and y [m/s], and rate of turn [rad/s]. It is at rest in the
+   !> middle of the cell, grows linearly by the jump from border to border, and turns with half of its gradient,
+   !> clockwise if this is positive. What a body has beyond it is the same for all copies of the body.
+   pure function shear_flow(cell, height) result(flow)
+      type(cell_t), intent(in) :: cell
+      !> Place along y [m]
+      real(wp), intent(in) :: height
+      real(wp) :: flow(3), gradient
+
+      flow = 0.0_wp
+      if (.not. cell%is_sheared) return
+      gradient = cell%jump/cell%size(2)
+      flow(1) = gradient*(height - (cell%low(2) + 0.5_wp*cell%size(2)))
+      flow(3) = -0.5_wp*gradient
+   end function shear_flow
+
+   !> The copy of a point that is in the cell [m]
+   pure function into_cell(cell, point) result(place)
+      type(cell_t), intent(in) :: cell
+      !> The point [m]
+      real(wp), intent(in) :: point(2)
+      real(wp) :: place(2), crossed
+
+      crossed = real(floor((point(2) - cell%low(2))*cell%inverse(2), ip), wp)
+      place(2) = point(2) - crossed*cell%size(2)
+      place(1) = point(1) - crossed*cell%shift
+      place(1) = place(1) - real(floor((place(1) - cell%low(1))*cell%inverse(1), ip), wp)*cell%size(1)
+   end function into_cell
+
+   !> Number of copies of a point that are in a rectangle, its lower and left edges included; in the plane 1 or 0
+   pure integer(ip) function copies_within(cell, low, high, point) result(n)
+      type(cell_t), intent(in) :: cell
+      !> Lower left and upper right corner [m]
+      real(wp), intent(in) :: low(2), high(2)
+      !> The point [m]
+      real(wp), intent(in) :: point(2)
+      integer(ip) :: rows(2), columns(2), row
+
+      n = 0_ip
+      rows = copies_between(low(2), high(2), point(2), cell%size(2))
+      do row = rows(1), rows(2)
+         columns = copies_between(low(1), high(1), point(1) + real(row, wp)*cell%shift, cell%size(1))
+         n = n + max(0_ip, columns(2) - columns(1) + 1_ip)
+      end do
+   end function copies_within
+
+   !> Numbers of the first and the last copy of a place that are in an interval, its lower end included. An interval as
+   !> long as the cell has one copy of each place, whatever the rounding.
+   pure function copies_between(low, high, place, period) result(copies)
+      !> Ends of the interval, and the place [m]
+      real(wp), intent(in) :: low, high, place
+      !> Distance of copies; 0: there are none [m]
+      real(wp), intent(in) :: period
+      integer(ip) :: copies(2)
+
+      if (period > 0.0_wp) then
+         copies = [ceiling((low - place)/period, ip), ceiling((high - place)/period, ip) - 1_ip]
+         if (abs(high - low - period) <= same_length*period) copies(2) = copies(1)
+      else
+         copies = [0_ip, merge(0_ip, -1_ip, place >= low .and. place < high)]
+      end if
+   end function copies_between
 
    !> Number of cells along y to the copy from which a distance leads to the nearest one
    elemental real(wp) function copies_along_y(cell, distance)

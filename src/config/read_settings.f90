@@ -8,7 +8,7 @@ module polydem_read_settings
    use polydem_check_materials, only: check_materials
    use polydem_check_parts, only: check_parts
    use polydem_check_settings, only: check_settings
-   use polydem_check_area, only: check_area
+   use polydem_check_area, only: check_area, check_rectangles
    use polydem_check_sources, only: check_sources
    use polydem_check_stages, only: check_stages
    use polydem_errors, only: error_t
@@ -73,6 +73,7 @@ contains
          call check_stages(settings, instances, error)
          call check_sources(settings, instances, error)
          call check_area(settings, instances, error)
+         call check_rectangles(settings, instances, error)
          call expand_short_motion(settings)
       type is (bench_settings_t)
          call read_values(file_name, text, overrides, .true., settings%source_locations_t, instances, error)

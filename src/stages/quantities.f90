@@ -4,7 +4,7 @@
 !> the table of contacts of the step (`advance` with `tabulate`).
 module polydem_quantities
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: cell_t
+   use polydem_cell, only: cell_t, copies_within
    use polydem_communicator, only: communicator_t
    use polydem_contact_resultant, only: find_resultant
    use polydem_contacts, only: contact_force, contacts_t
@@ -125,7 +125,7 @@ contains
       end do
    end subroutine find_pairs
 
-   !> Count the free bodies whose centres are in a rectangle. Collective.
+   !> Count the free bodies whose centres are in a rectangle; in a periodic cell each copy counts. Collective.
    subroutine count_grains(bodies, comm, low, high, number)
       type(bodies_t), intent(in) :: bodies
       class(communicator_t), intent(inout) :: comm
@@ -138,7 +138,7 @@ contains
 
       counts = 0_lp
       do k = 1_ip, size(bodies%free, kind=ip)
-         if (is_inside(bodies%position(:, bodies%free(k)), low, high)) counts = counts + 1_lp
+         counts = counts + int(copies_within(bodies%cell, low, high, bodies%position(:, bodies%free(k))), lp)
       end do
       call comm%all_reduce_sum(counts)
       number = real(counts(1), wp)
@@ -155,11 +155,13 @@ contains
       real(wp), intent(out) :: fraction
       type(exact_sum_t) :: sums(1)
       real(wp) :: total(1)
-      integer(ip) :: k
+      integer(ip) :: copies, k
 
       do k = 1_ip, size(bodies%free, kind=ip)
-         if (is_inside(bodies%position(:, bodies%free(k)), area%low, area%high)) &
-            call sums(1)%add(bodies%pieces%area_of(bodies%free(k)))
+         associate (s => bodies%free(k))
+            copies = copies_within(bodies%cell, area%low, area%high, bodies%position(:, s))
+            if (copies > 0_ip) call sums(1)%add(real(copies, wp)*bodies%pieces%area_of(s))
+         end associate
       end do
       call all_reduce_exact_sums(comm, sums)
       total = sums%value()
@@ -181,43 +183,43 @@ contains
       real(wp), intent(out) :: tensor(2, 2)
       type(exact_sum_t) :: sums(4)
       real(wp) :: force(2), shift(2), couple
-      integer(ip) :: c
-      logical :: has_first, has_second
+      integer(ip) :: c, copies(2)
 
       do c = 1_ip, contacts%n
-         has_first = counts(contacts%first(c))
-         has_second = counts(contacts%second(c))
-         if (.not. (has_first .or. has_second)) cycle
+         copies = [copies_of(contacts%first(c)), copies_of(contacts%second(c))]
+         if (all(copies == 0_ip)) cycle
          force = contact_force(contacts, c)
          call find_resultant(bodies, contacts, c, shift, couple)
-         if (has_first) call add(contacts%arm_first(:, c) + shift, force)
-         if (has_second) call add(contacts%arm_second(:, c) + shift, -force)
+         call add(copies(1), contacts%arm_first(:, c) + shift, force)
+         call add(copies(2), contacts%arm_second(:, c) + shift, -force)
       end do
       call all_reduce_exact_sums(comm, sums)
       tensor = reshape(-sums%value(), [2, 2])/area%size(1)/area%size(2)
 
    contains
 
-      !> Add the outer product of an arm and a force.
-      subroutine add(arm, force)
+      !> Add the outer product of an arm and a force for each copy.
+      subroutine add(copies, arm, force)
+         integer(ip), intent(in) :: copies
          real(wp), intent(in) :: arm(2), force(2)
          integer :: i, j
 
+         if (copies == 0_ip) return
          do j = 1, 2
             do i = 1, 2
-               call sums(2*(j - 1) + i)%add(arm(i)*force(j))
+               call sums(2*(j - 1) + i)%add(real(copies, wp)*(arm(i)*force(j)))
             end do
          end do
       end subroutine add
 
-      !> Whether this rank moves a body, and it is in the area
-      pure logical function counts(s)
+      !> Number of copies of a body in the area; 0 if this rank does not move it
+      pure integer(ip) function copies_of(s)
          !> Slot of the body
          integer(ip), intent(in) :: s
 
-         counts = is_mine(bodies, s)
-         if (counts) counts = is_inside(bodies%position(:, s), area%low, area%high)
-      end function counts
+         copies_of = 0_ip
+         if (is_mine(bodies, s)) copies_of = copies_within(bodies%cell, area%low, area%high, bodies%position(:, s))
+      end function copies_of
 
    end subroutine stress
 
@@ -236,22 +238,22 @@ contains
       !> Twice the square root of 1/pi
       real(wp), parameter :: diameter_of_area = 1.1283791670955126_wp
       type(exact_sum_t) :: sums(14)
-      real(wp) :: total(14), origin(2), x(2), v(2)
-      integer(ip) :: k
+      real(wp) :: total(14), x(2), v(2)
+      integer(ip) :: copies, k
       integer :: i
 
       associate (cell => bodies%cell)
-         origin = merge(area%low, 0.0_wp, area%high < huge(1.0_wp))
          do k = 1_ip, size(bodies%free, kind=ip)
             associate (s => bodies%free(k))
-               if (.not. is_inside(bodies%position(:, s), area%low, area%high)) cycle
-               x = merge(0.0_wp, bodies%position(:, s) - origin, cell%size > 0.0_wp)
+               copies = copies_within(cell, area%low, area%high, bodies%position(:, s))
+               if (copies == 0_ip) cycle
+               x = merge(0.0_wp, bodies%position(:, s) - area%low, cell%size > 0.0_wp)
                v = bodies%velocity(:, s)
                total = [1.0_wp, bodies%pieces%area_of(s), bodies%mass(s), x, v, &
                         x(1)*x(1), x(1)*x(2), x(2)*x(2), x(1)*v(1), x(1)*v(2), x(2)*v(1), x(2)*v(2)]
             end associate
             do i = 1, size(sums)
-               call sums(i)%add(total(i))
+               call sums(i)%add(real(copies, wp)*total(i))
             end do
          end do
          call all_reduce_exact_sums(comm, sums)
@@ -322,13 +324,6 @@ contains
 
       is_mine = .not. (bodies%fixed(s) .or. bodies%in_halo(s))
    end function is_mine
-
-   !> Whether a point is in a rectangle, its lower and left edges included
-   pure logical function is_inside(point, low, high)
-      real(wp), intent(in) :: point(2), low(2), high(2)
-
-      is_inside = all(point >= low) .and. all(point < high)
-   end function is_inside
 
    !> A quotient; 0 if the divisor is 0
    pure real(wp) function ratio(dividend, divisor)

@@ -7,10 +7,10 @@ module polydem_sample_area
    private
    public :: sample_area_t, find_area, has_area
 
-   !> The area. A body is in it if its centre is
+   !> The area. A body is in it if its centre is; in a periodic cell each copy counts
    type :: sample_area_t
-      !> Lower left and upper right corner; along an axis of a periodic cell without bound (2) [m]
-      real(wp) :: low(2) = -huge(1.0_wp), high(2) = huge(1.0_wp)
+      !> Lower left and upper right corner (2) [m]
+      real(wp) :: low(2) = 0.0_wp, high(2) = 0.0_wp
       !> Width and height (2) [m]
       real(wp) :: size(2) = 0.0_wp
    end type sample_area_t
@@ -43,7 +43,10 @@ contains
             if (size(sample%ends) == 2) call bound(area, 2, wall_pair(simulation, sample%ends), simulation)
          end if
          do axis = 1, 2
-            if (.not. area%size(axis) > 0.0_wp) area%size(axis) = cell%size(axis)
+            if (area%size(axis) > 0.0_wp) cycle
+            area%low(axis) = cell%low(axis)
+            area%high(axis) = cell%low(axis) + cell%size(axis)
+            area%size(axis) = cell%size(axis)
          end do
       end associate
    end subroutine find_area

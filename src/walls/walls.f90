@@ -3,7 +3,7 @@ module polydem_walls
    use polydem_bodies, only: bodies_t
    use polydem_bodies_in_cell, only: put_into_cell
    use polydem_communicator, only: communicator_t
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_named_values, only: named_values_t
    use polydem_named_walls, only: named_walls_t
    use polydem_wall, only: move_wall, wall_t
@@ -86,6 +86,7 @@ contains
       if (allocated(self%loads)) call carry_walls(self%loads, self%named, bodies)
       if (.not. bodies%cell%is_periodic) return
       do k = 1, size(self%driven)
+         bodies%image(self%driven(k)%slots, :) = 0_ip
          call put_into_cell(bodies, self%driven(k)%slots)
       end do
    end subroutine move

@@ -99,6 +99,28 @@ SCENES = {
 &forces gravity = 0, 0 stiffness = 1e6 /
 &integrate safety_factor = 0.1 duration = 0.02 /
 """,
+    # What happens at the border of a sheared cell: bodies start beyond it, enter, leave and are counted across it, and
+    # feel forces that depend on their velocity.
+    "border": """\
+&cell periodic = 'xy' low = -0.05, -0.03 size = 0.1, 0.1 shear_rate = 60 profile = .true. /
+&grains name = 'sample' region = 'box' low = -0.02, 0.01 high = 0.08, 0.11 number = 70 arrangement = 'spread'
+   speed = 1 spin = 50 momentum = 'zero' /
+&source name = 'feed' low = -0.08, 0.04 high = -0.02, 0.1 count = 90 interval = 30 velocity = 0.5, -1 size_ratio = 2 /
+&sink name = 'hole' low = 0.03, 0.05 high = 0.07, 0.09 interval = 40 /
+&sample area = 'rectangle' low = 0, 0.03 high = 0.09, 0.09 /
+&forces gravity = 0, 0 stiffness = 1e6 drag = 5 local_damping = 0.1 /
+&integrate safety_factor = 0.1 duration = 0.01 /
+""",
+    # A load carries a rough base over the border several times.
+    "carried": """\
+&cell periodic = 'x' low = 0.1, 0 size = 0.1, 0 /
+&wall name = 'base' outline = 'row' from = 0, 0 to = 0.1, 0 segments = 9 radius = 4e-3 corners = 7 /
+&wall name = 'floor' outline = 'line' from = 0, -5e-3 to = 0.3, -5e-3 thickness = 0.01 /
+&grains name = 'grains' region = 'box' low = 0, 6e-3 high = 0.1, 0.06 number = 30 speed = 1 /
+&load name = 'pull' wall = 'base' direction = 'x' force = 4e3 mass = 2 damping_ratio = 0.02 /
+&forces gravity = 40, -60 stiffness = 2e6 /
+&integrate duration = 0.015 /
+""",
     # A chute: grains slide over a rough base that moves itself, and a shaking floor that spans the cell.
     "chute": """\
 &cell periodic = 'x' low = 0.1, 0 size = 0.2, 0 /
@@ -174,6 +196,8 @@ OTHER_GROUPS = """\
 &neighbours finder = '{finder}' /
 """
 
+#: Scenes with a series
+RECORDED = ("walls", "border", "carried")
 #: Frames in the duration of a scene, without the first
 N_FRAMES = 20
 
@@ -182,6 +206,6 @@ def write_scene(path, scene, finder="quadtree", longer=1):
     """Write the namelist of a scene, of so many times its duration, with as many frames in each."""
     head, tail = SCENES[scene].rsplit("duration = ", 1)
     duration, rest = tail.split(" ", 1)
-    series = "series_interval = 1e-4 csv = .true. " if scene == "walls" else ""
+    series = "series_interval = 1e-4 csv = .true. " if scene in RECORDED else ""
     groups = OTHER_GROUPS.format(interval=float(duration) / N_FRAMES, finder=finder, series=series)
     path.write_text(f"{head}duration = {longer * float(duration)} {rest}{groups}", encoding="utf-8")

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 
+import h5py
 from check_continue import BAD_INPUT, FAILED
 
 #: An mpirun that ends with its ranks
@@ -206,6 +207,60 @@ def a_sheared_cell_goes_on_where_it_was(case):
     assert max(depths) < 2e-3, depths
 
 
+def bodies_beyond_the_border_start_where_their_copies_are(case):
+    """Finds bodies that lose shift and velocity of the border, a shear that is added twice, and lost crossings."""
+    cell = "&cell periodic = 'xy' low = {low} size = 0.125, 0.125 {shear} /\n"
+    shear = "shear_rate = 96 profile = .true."
+    rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT
+    short = rest.format(duration="duration = 7.8125e-3", scheme="") + "&output series_interval = 1e-3 /\n"
+    short = short.replace("/\n&output series", "series")
+    gas = GAS.replace("high = 0.1, 0.1 number = 60", "high = 0.125, 0.125 number = 110").replace("0.5", "3")
+    case.run(cell.format(low="0, 0", shear=shear) + gas + short, "first")
+    start = "&scene name = 'result' start_from = '{}' /\n"
+    # A border elsewhere puts many bodies into other copies, with the velocities that they have there.
+    outputs = [case.run(cell.format(low=low, shear=shear) + start.format("first" + frame) + short, f"on_{k}")
+               for k, (low, frame) in enumerate((("0, 0", ""), ("0.03125, 0.0625", ""), ("0, 0", ":-1"),
+                                                 ("0.03125, 0.0625", ":-1")))]
+    assert "bodies outside were moved into it" in outputs[1], outputs[1]
+    for k in (0, 2):
+        for frame in (0, -1):
+            here, there = (last_bodies(f"on_{n}", frame) for n in (k, k + 1))
+            # Relative to the shear all copies have the same velocity.
+            one = here["velocity"][:, 0] - 96.0 * (here["position"][:, 1] - 0.0625)
+            other = there["velocity"][:, 0] - 96.0 * (there["position"][:, 1] - 0.0625)
+            assert abs(one - other).max() < 1e-5, (k, frame, abs(one - other).max())
+            assert abs(here["velocity"][:, 1] - there["velocity"][:, 1]).max() < 1e-5, (k, frame)
+            assert abs(here["path"] - there["path"]).max() < 1e-7 or frame != 0, (k, frame)
+    before, after = last_bodies("first", -1), last_bodies("on_0", 0)
+    assert abs(before["path"] - after["path"]).max() < 1e-12
+    # The profile is added once, also to a sample that does not have it yet; after that it is there.
+    case.run(cell.format(low="0, 0", shear="") + gas + short, "still")
+    for k, origin in enumerate(("still", "still:-1")):
+        case.run(cell.format(low="0, 0", shear=shear) + start.format(origin) + short, f"sheared_{k}")
+        gain = last_bodies(f"sheared_{k}", 0)
+        former = last_bodies("still", -1)
+        assert abs(gain["velocity"][:, 0] - former["velocity"][:, 0]
+                   - 96.0 * (gain["position"][:, 1] - 0.0625)).max() < 1e-12, origin
+        moved = last_bodies(f"sheared_{k}", 1)["velocity"][:, 0] - gain["velocity"][:, 0]
+        assert abs(moved).mean() < 1.0, origin
+    # Gravity works along the whole path, which the first frame of a start has, too.
+    fall = short.replace("gravity = 0, 0", "gravity = 40, 0")
+    case.run(cell.format(low="0, 0", shear="") + gas + fall, "falls")
+    output = case.run(cell.format(low="0, 0", shear="") + start.format("falls") + fall, "falls_on")
+    assert float(re.search(r"energy (\S+) of the largest", output).group(1)) < 0.01, output
+
+
+def last_bodies(folder, frame):
+    """Positions, velocities and paths in a frame of a result of one or more segments."""
+    files = sorted(name for name in os.listdir(folder) if re.fullmatch(r"trajectory_\d+\.h5", name))
+    with h5py.File(os.path.join(folder, files[0 if frame >= 0 else -1])) as file:
+        found = {name: file["frames"][name][frame] for name in ("position", "velocity")}
+        path = found["position"] + file["frames/image"][frame] * file["cell/size"][:]
+        if "slid" in file["frames"]:
+            path[:, 0] += file["frames/slid"][frame]
+    return {**found, "path": path}
+
+
 def pieces_keep_their_history(case):
     """Finds bodies that lose their pieces in a start from a result, and sources that lose those of others."""
     cross = "shape = 'cross' width = 0.009 arm = 3e-3 angle = 0, 360"
@@ -317,7 +372,8 @@ def faults_are_named(case):
 
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
-         a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was, pieces_keep_their_history,
+         a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was,
+         bodies_beyond_the_border_start_where_their_copies_are, pieces_keep_their_history,
          a_stage_that_ends_at_once_is_told, walls_do_not_jump_when_motions_change,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)

@@ -1,13 +1,14 @@
-!> Checks of the group &sample.
+!> Checks of rectangles: the area of the sample, and all rectangles in a periodic cell.
 module polydem_check_area
    use polydem_blame_entry, only: blame
    use polydem_errors, only: error_t
    use polydem_group_instances, only: index_of_instance, instance_t
+   use polydem_kinds, only: wp
    use polydem_settings, only: settings_t
-   use polydem_strings, only: text_t
+   use polydem_strings, only: text_t, to_text
    implicit none
    private
-   public :: check_area
+   public :: check_area, check_rectangles
 
 contains
 
@@ -29,6 +30,63 @@ contains
          end if
       end associate
    end subroutine check_area
+
+   !> Check that no rectangle in which bodies enter, leave or are counted is longer than the periodic cell: it would have
+   !> several copies of a body.
+   pure subroutine check_rectangles(settings, instances, error)
+      !> Settings with all entries filled in
+      type(settings_t), intent(in) :: settings
+      !> All groups with their values, which contain the places for messages
+      type(instance_t), intent(in) :: instances(:)
+      !> First rectangle that is too long
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      if (settings%cell%periodic == 'none') return
+      do k = 1, size(settings%source)
+         associate (source => settings%source(k))
+            call check_length('source', source%name, source%low, source%high, error)
+         end associate
+      end do
+      do k = 1, size(settings%sink)
+         associate (sink => settings%sink(k))
+            call check_length('sink', sink%name, sink%low, sink%high, error)
+         end associate
+      end do
+      do k = 1, size(settings%stage)
+         associate (stage => settings%stage(k))
+            if (any(stage%until == [character(len=14) :: 'count', 'solid_fraction'])) &
+               call check_length('stage', stage%name, stage%low, stage%high, error)
+         end associate
+      end do
+      associate (sample => settings%sample)
+         if (sample%area == 'rectangle') call check_length('sample', '', sample%low, sample%high, error)
+      end associate
+
+   contains
+
+      !> Compare the sides of a rectangle with those of the cell.
+      pure subroutine check_length(group, name, low, high, error)
+         !> Group with the rectangle, and its name
+         character(len=*), intent(in) :: group, name
+         !> Corners of the rectangle [m]
+         real(wp), intent(in) :: low(2), high(2)
+         type(error_t), allocatable, intent(inout) :: error
+         integer :: axis
+
+         do axis = 1, 2
+            if (scan(settings%cell%periodic, 'xy'(axis:axis)) == 0) cycle
+            associate (period => settings%cell%size(axis))
+               if (high(axis) - low(axis) <= 1.000001_wp*period) cycle
+               call blame(instances(index_of_instance(instances, group, name)), 'high', 'makes the rectangle '// &
+                  to_text(high(axis) - low(axis), 3)//' m long along '//'xy'(axis:axis)//', but the periodic cell '// &
+                  'is only '//to_text(period, 3)//' m long, so it would have several copies of a body; make it at '// &
+                  'most as long as the cell, which then means everywhere', error, 'low')
+            end associate
+         end do
+      end subroutine check_length
+
+   end subroutine check_rectangles
 
    !> Check the walls that bound the area along an axis.
    pure subroutine check_pair(names, key, is_periodic, instance, error)

@@ -6,6 +6,7 @@
 !> force and torque of the fixed body; the velocities of fixed bodies are known on every rank.
 module polydem_body_contributions
    use polydem_bodies, only: bodies_t
+   use polydem_cell, only: shear_flow
    use polydem_force_sums, only: force_sums_t, n_terms, of_elastic, of_normal, of_tangential, sum_energy, sum_torque, &
       sum_x, sum_y, term_list_t
    use polydem_kinds, only: ip, wp
@@ -87,7 +88,8 @@ contains
 
    !> Add the impulses of forces on some bodies that are no contacts to their wall channels, times a weight, as of a
    !> fixed body at rest. Their powers are among those of damping. That of an acceleration from outside moves from there
-   !> to the power of fixed bodies.
+   !> to the power of fixed bodies, and so does that of the rest at the velocity of the shear of the cell, so that all
+   !> copies of a body have the same power of damping.
    pure subroutine add_fields(bodies, field, acceleration, weight, first, last, channels, wall_channels)
       type(bodies_t), intent(in) :: bodies
       !> Forces along x and y [N/m] and torques [N], (3, slot)
@@ -102,7 +104,7 @@ contains
       real(wp), intent(inout) :: channels(:, :)
       !> Wall channels of all bodies, (n_wall_channels, slot)
       real(wp), intent(inout) :: wall_channels(:, :)
-      real(wp) :: power, torque
+      real(wp) :: power, torque, flow(3)
       integer(ip) :: s
 
       do s = first, last
@@ -115,6 +117,14 @@ contains
             on_walls(6) = on_walls(6) + weight*abs(torque)
          end associate
       end do
+      if (bodies%cell%is_sheared) then
+         do s = first, last
+            flow = shear_flow(bodies%cell, bodies%position(2, s))
+            power = weight*((field(1, s) - bodies%mass(s)*acceleration(1))*flow(1) + field(3, s)*flow(3))
+            channels(2, s) = channels(2, s) - power
+            wall_channels(1, s) = wall_channels(1, s) + power
+         end do
+      end if
       if (.not. any(abs(acceleration) > 0.0_wp)) return
       do s = first, last
          power = weight*bodies%mass(s)*(acceleration(1)*bodies%velocity(1, s) + acceleration(2)*bodies%velocity(2, s))

@@ -2,7 +2,8 @@
 !>
 !> A new one is a file with a type that extends `body_force_t`, and a line in `body_forces.f90`. It acts on the free
 !> bodies, with their positions and velocities at the evaluation of the contacts. Its work counts as damping, and its
-!> impulse as that of a fixed body; the angular impulse has an error of second order in dt.
+!> impulse as that of a fixed body; the angular impulse has an error of second order in dt. What depends on a velocity
+!> takes that relative to `shear_flow`, which is the same for all copies of a body in a sheared cell.
 module polydem_body_force
    use polydem_bodies, only: bodies_t, block_size
    use polydem_kinds, only: ip, wp

@@ -1,9 +1,12 @@
-!> Drag of a medium at rest, in proportion to momentum: a free body slows down as exp(-c t), whatever its size.
+!> Drag of a medium, in proportion to momentum: a free body slows down as exp(-c t), whatever its size.
 !>
-!> A body that falls reaches the speed g/c. Translation and rotation have the same rate.
+!> A body that falls reaches the speed g/c. Translation and rotation have the same rate. The medium is at rest; in a
+!> sheared cell it is sheared like the cell, and momentum is relative to it. The torque is then that of a drag on each
+!> element of mass of a body whose moments of inertia are equal along all axes.
 module polydem_drag
    use polydem_bodies, only: bodies_t, block_size
    use polydem_body_force, only: body_force_t
+   use polydem_cell, only: shear_flow
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -34,14 +37,16 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: slots(:)
       real(wp), intent(inout) :: force(3, block_size)
+      real(wp) :: flow(3)
       integer(ip) :: k
 
       associate (unused => others)
       end associate
       do k = 1_ip, size(slots, kind=ip)
          associate (s => slots(k))
-            force(1:2, k) = force(1:2, k) - self%rate*bodies%mass(s)*bodies%velocity(:, s)
-            force(3, k) = force(3, k) - self%rate*bodies%inertia(s)*bodies%angular_velocity(s)
+            flow = shear_flow(bodies%cell, bodies%position(2, s))
+            force(1:2, k) = force(1:2, k) - self%rate*bodies%mass(s)*(bodies%velocity(:, s) - flow(1:2))
+            force(3, k) = force(3, k) - self%rate*bodies%inertia(s)*(bodies%angular_velocity(s) - flow(3))
          end associate
       end do
    end subroutine add

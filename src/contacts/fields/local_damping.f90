@@ -2,10 +2,11 @@
 !> -alpha |F| sign v (P.A. Cundall, in Analytical and Computational Methods in Engineering Rock Mechanics (1987) 129).
 !>
 !> It brings a sample to rest in few oscillations, whatever their frequency, and vanishes in equilibrium. Free fall is
-!> slower by the same share, so it is no model of a flow.
+!> slower by the same share, so it is no model of a flow. In a sheared cell the velocity is that relative to the shear.
 module polydem_local_damping
    use polydem_bodies, only: bodies_t, block_size
    use polydem_body_force, only: body_force_t
+   use polydem_cell, only: shear_flow
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -45,6 +46,7 @@ contains
       do k = 1_ip, size(slots, kind=ip)
          velocity(1:2) = bodies%velocity(:, slots(k))
          velocity(3) = bodies%angular_velocity(slots(k))
+         velocity = velocity - shear_flow(bodies%cell, bodies%position(2, slots(k)))
          do i = 1, 3
             if (abs(velocity(i)) > 0.0_wp) &
                force(i, k) = force(i, k) - sign(self%share*abs(others(i, k) + force(i, k)), velocity(i))

@@ -60,6 +60,7 @@ contains
                       'shifts of the crossed borders, to be added to this path along x', part, rows=rows)
       call file%write('/frames/shift', real(bodies%cell%shift, dp), error, 'm', &
                       'displacement of the copy of the cell above along x', rows=one_row)
+      call file%write('/frames/jump', real(bodies%cell%jump, dp), error, 'm/s', 'its velocity', rows=one_row)
    end subroutine write_poses
 
 end module polydem_frame_poses

@@ -17,8 +17,8 @@ module polydem_frame_reader
    type :: surroundings_t
       !> Width and height of a cell that obeys a stress; 0 if the size of the cell is constant, or there is none [m]
       real(wp) :: size(2) = 0.0_wp
-      !> Displacement of the copy above [m]
-      real(wp) :: shift = 0.0_wp
+      !> Displacement [m] and velocity [m/s] of the copy above
+      real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Whether a checkpoint has the cells that bodies have crossed, and the shifts of the borders that they crossed
       logical :: has_images = .false., has_slides = .false.
       !> Greatest number of pieces of a body, in a checkpoint
@@ -170,7 +170,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       integer(ip), allocatable :: most(:)
-      real(dp), allocatable :: values(:), rows(:, :), shift(:)
+      real(dp), allocatable :: values(:), rows(:, :), shift(:), jump(:)
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -182,10 +182,12 @@ contains
          call file%read('/frames/cell_size', rows, error, rows=[row, 1_lp])
          if (.not. allocated(error)) values = rows(:, 1)
       end if
-      if (found%has_slides) then
+      if (file%has('/run/shift', error)) then
          call file%read('/run/shift', shift, error)
+         call file%read('/run/jump', jump, error)
       else if (file%has('/frames/shift', error)) then
          call file%read('/frames/shift', shift, error, rows=[row, 1_lp])
+         call file%read('/frames/jump', jump, error, rows=[row, 1_lp])
       end if
       if (file%has('/vertices/piece', error)) call file%read('/run/most_pieces', most, error)
       call file%close(error)
@@ -195,6 +197,7 @@ contains
       end if
       if (allocated(shift)) then
          if (size(shift) == 1) found%shift = real(shift(1), wp)
+         if (size(jump) == 1) found%jump = real(jump(1), wp)
       end if
       if (.not. allocated(most)) return
       if (size(most) == 1 .and. all(most >= 1_ip)) found%most_pieces = most(1)

@@ -94,7 +94,7 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
-      real(wp) :: shift
+      real(wp) :: shift, jump
       integer :: k
 
       call serialize_progress(serializer, simulation%step, attempts)
@@ -122,8 +122,12 @@ contains
          if (allocated(s%walls%loads)) call serialize_loads(s%walls%loads, serializer)
          if (allocated(s%bodies%cell%load)) call serialize_cell(s%bodies%cell, serializer)
          shift = s%bodies%cell%shift
-         if (s%bodies%cell%is_sheared .and. .not. serializer%is_reading) call serializer%field('/run/shift', shift, &
-            'm', 'displacement of the copy above a sheared cell, for a run that starts from this one')
+         jump = s%bodies%cell%jump
+         if (s%bodies%cell%is_sheared .and. .not. serializer%is_reading) then
+            call serializer%field('/run/shift', shift, 'm', 'displacement of the copy above a sheared cell, for a '// &
+                                  'run that starts from this one')
+            call serializer%field('/run/jump', jump, 'm/s', 'its velocity')
+         end if
          if (s%settings%output%series_interval > 0.0_wp) then
             call s%walls%record%serialize(serializer)
             call s%series%serialize(serializer)

@@ -12,6 +12,7 @@ module polydem_start_from
    use polydem_checkpoint_fields, only: attempts_t, read_pairs, serialize_progress
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_communicator, only: communicator_t
+   use polydem_enter_cell, only: join_copies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
    use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
@@ -143,6 +144,9 @@ contains
          if (.not. allocated(error)) call new_bodies(list, bodies, error)
       else
          bodies%pieces%most = origin%around%most_pieces
+         ! Paths through the copies of a cell go on.
+         bodies%cell%is_periodic = origin%around%has_images .and. settings%cell%periodic /= 'none'
+         bodies%cell%is_sheared = origin%around%has_slides .and. bodies%cell%is_periodic
          call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
@@ -159,6 +163,7 @@ contains
       call comm%all_reduce_error(error)
       if (allocated(error)) return
       bodies%cell%first_shift = origin%around%shift
+      bodies%cell%jump = origin%around%jump
       do s = 1_ip, bodies%n
          if (bodies%fixed(s)) call rest(bodies, s)
       end do
@@ -267,7 +272,7 @@ contains
    end subroutine open_start
 
    !> Return to the state of the checkpoint from which a simulation starts, after its forces at time 0 were computed and
-   !> used. Collective; all ranks get the same error.
+   !> used. Bodies enter the cell as they did then. Collective; all ranks get the same error.
    subroutine return_to_state(simulation, error)
       !> The simulation before its first step
       type(simulation_t), intent(inout) :: simulation
@@ -288,11 +293,13 @@ contains
          if (.not. origin%around%has_slides .and. allocated(bodies%slid)) deallocate (bodies%slid)
          call serialize_bodies(file, bodies)
          call set_cell(bodies, before%cell)
+         if (bodies%cell%is_periodic) call join_copies(simulation%settings%cell, bodies%free, bodies)
          call simulation%motion%integrator%serialize(file)
          call read_pairs(file, simulation, origin%around%most_pieces)
          do s = 1_ip, bodies%n
             if (.not. bodies%fixed(s)) cycle
             bodies%position(:, s) = before%position(:, s)
+            if (allocated(bodies%image)) bodies%image(s, :) = before%image(s, :)
             bodies%angle(s) = before%angle(s)
             bodies%velocity(:, s) = before%velocity(:, s)
             bodies%angular_velocity(s) = before%angular_velocity(s)

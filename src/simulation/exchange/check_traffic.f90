@@ -4,7 +4,7 @@ module polydem_check_traffic
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_exchange_bodies, only: meets_fixed
+   use polydem_exchange_bodies, only: meets_fixed, put_candidates
    use polydem_kinds, only: lp, wp
    use polydem_random, only: random_t
    use polydem_simulation, only: simulation_t
@@ -83,21 +83,14 @@ contains
 
       copy = source
       call copy%draw_candidates(n_tried, candidates)
+      call put_candidates(self%bodies, candidates)
       widest = 2.0_wp*maxval(candidates%radius)
-      associate (name => source%settings%name, low => source%settings%low, high => source%settings%high, &
-                 cell => self%bodies%cell)
+      associate (name => source%settings%name, low => source%settings%low, high => source%settings%high)
          if (any(high - low < widest)) then
             call raise(error, input_error, place_of(self%settings, 'source.'//name, 'high')// &
                        ': ''high'' in &source '//name//' leaves no room: its bodies are up to '// &
                        to_text(widest, 3)//' m long; make the rectangle at least as wide and as high')
             return
-         end if
-         if (cell%is_periodic) then
-            if (any(cell%size > 0.0_wp .and. (low < cell%low .or. high > cell%low + cell%size))) then
-               call raise(error, input_error, place_of(self%settings, 'source.'//name, 'low')//': the rectangle of '// &
-                          '&source '//name//' reaches out of the periodic cell; give one within it')
-               return
-            end if
          end if
          if (size(self%walls%driven) > 0 .or. self%walls%named%has_gates()) return
          has_room = .false.

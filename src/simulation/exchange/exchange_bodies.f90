@@ -8,7 +8,7 @@
 module polydem_exchange_bodies
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_cell, only: nearest_copy
+   use polydem_cell, only: cell_t, copies_within, into_cell, nearest_copy, shear_flow
    use polydem_changed_bodies, only: count_entering, find_leaving_totals, n_totals, take_leaving
    use polydem_communicator, only: communicator_t
    use polydem_elementary, only: hypotenuse
@@ -25,7 +25,7 @@ module polydem_exchange_bodies
    use polydem_wall_energy, only: release_energy
    implicit none
    private
-   public :: exchange_bodies, find_leaving, meets_fixed
+   public :: exchange_bodies, find_leaving, meets_fixed, put_candidates
 
 contains
 
@@ -177,14 +177,14 @@ contains
 
    contains
 
-      !> Number of the first sink in which a point is; 0: none
+      !> Number of the first sink in which a point or a copy of it is; 0: none
       pure integer(ip) function sink_of(point)
          real(wp), intent(in) :: point(2)
          integer(ip) :: j
 
          do j = 1_ip, size(self%traffic%sinks, kind=ip)
             associate (sink => self%traffic%sinks(j))
-               if (all(point >= sink%settings%low) .and. all(point < sink%settings%high)) then
+               if (copies_within(self%bodies%cell, sink%settings%low, sink%settings%high, point) > 0_ip) then
                   if (is_due(sink%settings%interval, sink%stage, self%step, self%stages%number)) then
                      sink_of = j
                      return
@@ -224,6 +224,7 @@ contains
             wanted = source%wanted(n_free, self%step, first, self%dt)
             if (wanted == 0_lp) cycle
             call source%draw_candidates(wanted, candidates)
+            call put_candidates(self%bodies, candidates)
             call mark_blocked(self, source, candidates, kept, is_blocked)
             call self%comm%all_reduce_max(is_blocked)
             call admit(self, source, candidates, is_blocked, circles, list, n_entered)
@@ -232,6 +233,21 @@ contains
          end associate
       end do
    end subroutine list_entries
+
+   !> Put the places of candidates into the cell, if there is one.
+   pure subroutine put_candidates(bodies, candidates)
+      !> Bodies, of which the cell is used
+      type(bodies_t), intent(in) :: bodies
+      type(candidate_t), intent(inout) :: candidates(:)
+      integer :: j, k
+
+      if (.not. bodies%cell%is_periodic) return
+      do k = 1, size(candidates)
+         do j = 1, size(candidates(k)%place, 2)
+            candidates(k)%place(:, j) = into_cell(bodies%cell, candidates(k)%place(:, j))
+         end do
+      end do
+   end subroutine put_candidates
 
    !> Mark the places at which a candidate would meet a body of this rank.
    subroutine mark_blocked(self, source, candidates, kept, is_blocked)
@@ -278,6 +294,8 @@ contains
          associate (s => bodies%free(k))
             if (.not. kept(s)) cycle
             offset = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, s) - point)
+            ! Copies above and below that slide may be nearer along x.
+            if (bodies%cell%is_sheared) offset(1) = 0.0_wp
             if (hypotenuse(offset(1), offset(2)) >= reach + bodies%radius(s)) cycle
             n = n + 1_ip
             near(:, n) = [bodies%position(:, s), bodies%radius(s)]
@@ -377,21 +395,24 @@ contains
          end do
          if (n == 0) return
          circles = reshape([circles, candidates(k)%place(:, n), candidates(k)%radius], [3, size(circles, 2) + 1])
-         call append_candidate(source, candidates(k), candidates(k)%place(:, n), list)
+         call append_candidate(self%bodies%cell, source, candidates(k), candidates(k)%place(:, n), list)
          n_entered = n_entered + 1
       end do
    end subroutine admit
 
-   !> Append a body that enters.
-   subroutine append_candidate(source, candidate, place, list)
+   !> Append a body that enters. Its velocity is that of the source, relative to the shear of the cell.
+   subroutine append_candidate(cell, source, candidate, place, list)
+      type(cell_t), intent(in) :: cell
       type(source_t), intent(inout) :: source
       type(candidate_t), intent(in) :: candidate
       !> Its place [m]
       real(wp), intent(in) :: place(2)
       type(body_list_t), intent(inout) :: list
+      real(wp) :: flow(3)
 
+      flow = shear_flow(cell, place(2))
       call list%append(candidate%corners + spread(place, 2, size(candidate%corners, 2)), density=source%density, &
-                       velocity=source%settings%velocity, material=source%material, piece=candidate%piece)
+                       velocity=source%settings%velocity + flow(:2), material=source%material, piece=candidate%piece)
       source%entered = source%entered + 1_lp
       source%shapes = candidate%after
    end subroutine append_candidate

@@ -64,8 +64,8 @@ contains
          if (allocated(self%bodies%material) .and. .not. allocated(added%material)) &
             allocate (added%material(added%n), source=0_ip)
          call added%pieces%allow(self%bodies%pieces%most)
-         call start_added(self, added, entering)
          call set_cell(added, self%bodies%cell)
+         call start_added(self, added, entering)
          slots = [(s, s=1_ip, added%n)]
          call pack_bodies(added, slots, new)
          call join_packed(packed%bodies, new)

@@ -1,44 +1,53 @@
 !> Puts the bodies of a simulation into its periodic cell at the start.
 module polydem_enter_cell
-   use polydem_bodies, only: turn_bodies
-   use polydem_bodies_in_cell, only: find_folds, put_into_cell, set_cell
+   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_bodies_in_cell, only: add_profile, find_folds, put_into_cell, set_cell
    use polydem_cell, only: cell_t, new_cell
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion_table, only: greatest_values
    use polydem_run_duration, only: number_of_stage
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: cell_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
    use polydem_wall_load, only: along_angle
    implicit none
    private
-   public :: enter_cell, check_constraint
+   public :: enter_cell, join_copies, check_constraint
 
    !> Names of the axes
    character(len=1), parameter :: name(2) = ['x', 'y']
+   !> Greatest distance of a body from the cell at the start, in cells: such a place keeps the digits for contacts
+   real(wp), parameter :: most_cells = 1.0e6_wp
 
 contains
 
    !> Put all bodies into the cell, if there is one, and check that it is large enough for them. Collective; all ranks
    !> get the same error.
    subroutine enter_cell(self, error)
-      !> The simulation with its settings, bodies and walls. On entry the cell of the bodies has nothing but the first
-      !> displacement of the copy above; `n_outside` counts the bodies that were outside the cell
+      !> The simulation with its settings, bodies and walls. On entry the cell of the bodies has nothing but displacement
+      !> and velocity of the copy above in the result from which the run starts; `n_outside` counts the bodies that were
+      !> outside the cell
       type(simulation_t), intent(inout) :: self
       !> Names a body that is too large for the cell
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: largest(1)
+      real(wp) :: largest(1), former_jump
       integer(lp) :: n_outside(1)
+      integer(ip), allocatable :: former(:, :)
+      logical, allocatable :: is_outside(:)
       integer(ip) :: s
 
       if (self%settings%cell%periodic == 'none') return
       associate (bodies => self%bodies, settings => self%settings)
+         former_jump = bodies%cell%jump
          call set_cell(bodies, new_cell(settings%cell%periodic, settings%cell%low, settings%cell%size, &
                                        settings%cell%shear_rate, settings%cell%shear_ramp, &
                                        bodies%cell%first_shift))
+         ! A velocity beyond the profile is that of all copies.
+         if (settings%cell%profile) bodies%cell%former_jump = 0.0_wp
+         if (settings%scene%name == 'result') bodies%cell%former_jump = former_jump
          if (settings%cell%obeys /= 'none') call let_yield(settings, bodies%cell)
          call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
          call find_folds(bodies)
@@ -48,15 +57,17 @@ contains
          if (allocated(bodies%cell%load)) bodies%cell%load%least = 2.0_wp*largest(1) + 4.0_wp*settings%boxes%margin
          do s = 1_ip, bodies%n
             call check_size(self, s, largest(1) + 2.0_wp*settings%boxes%margin, error)
+            if (.not. allocated(error)) call check_place(self, s, error)
             if (allocated(error)) exit
          end do
          call check_walls(self, error)
          call self%comm%all_reduce_error(error)
          if (allocated(error)) return
-         call put_into_cell(bodies, [(s, s=1_ip, bodies%n)])
-         self%n_outside = count(any(bodies%image(bodies%free, :) /= 0_ip, 2), kind=lp)
-         if (self%comm%is_root()) self%n_outside = self%n_outside &
-            + count(any(bodies%image /= 0_ip, 2) .and. bodies%fixed, kind=lp)
+         former = bodies%image
+         call join_copies(settings%cell, [(s, s=1_ip, bodies%n)], bodies)
+         is_outside = any(bodies%image /= former, 2)
+         self%n_outside = count(is_outside(bodies%free), kind=lp)
+         if (self%comm%is_root()) self%n_outside = self%n_outside + count(is_outside .and. bodies%fixed, kind=lp)
          n_outside = self%n_outside
          call self%comm%all_reduce_sum(n_outside)
          self%n_outside = n_outside(1)
@@ -64,17 +75,27 @@ contains
          do s = 1_ip, bodies%n
             if (bodies%fixed(s)) bodies%image(s, :) = 0_ip
          end do
-         if (settings%cell%profile) then
-            do s = 1_ip, bodies%n
-               bodies%velocity(1, s) = bodies%velocity(1, s) + bodies%cell%rate* &
-                  (bodies%position(2, s) - (bodies%cell%low(2) + 0.5_wp*bodies%cell%size(2)))
-            end do
-         end if
          do s = 1_ip, size(self%walls%driven, kind=ip)
             self%walls%driven(s)%position = bodies%position(:, self%walls%driven(s)%slots)
          end do
       end associate
    end subroutine enter_cell
+
+   !> Put bodies into the cell at the start, and give them the profile of its shear, less that which they have already.
+   pure subroutine join_copies(settings, slots, bodies)
+      type(cell_settings_t), intent(in) :: settings
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies after `find_folds`, in a cell before its first step: its former jump is that of the shear of the bodies
+      type(bodies_t), intent(inout) :: bodies
+
+      call put_into_cell(bodies, slots)
+      if (.not. settings%profile) return
+      associate (cell => bodies%cell)
+         if (abs(cell%rate*cell%size(2) - cell%former_jump) > 0.0_wp) &
+            call add_profile(bodies, cell%rate - cell%former_jump/cell%size(2), slots)
+      end associate
+   end subroutine join_copies
 
    !> Let the size of the cell obey a stress. Its mass is set later.
    subroutine let_yield(settings, cell)
@@ -165,6 +186,27 @@ contains
          end do
       end associate
    end subroutine check_size
+
+   !> Check that a body is not so far from the cell that it cannot be put into it.
+   subroutine check_place(self, s, error)
+      type(simulation_t), intent(in) :: self
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: axis
+
+      associate (bodies => self%bodies, cell => self%bodies%cell, place => self%bodies%position(:, s))
+         do axis = 1, 2
+            if (abs(place(axis) - cell%low(axis))*bodies%folds(axis, s) <= most_cells) cycle
+            call raise(error, input_error, place_of(self%settings, 'cell', 'low')//': ''low'' in &cell: the place '// &
+               to_text(place(1))//', '//to_text(place(2))//' m of body '//to_text(bodies%id(s))//' is '// &
+               to_text(abs(place(axis) - cell%low(axis))*cell%inverse(axis), 3)//' cells away along '//name(axis)// &
+               ', more than '//to_text(most_cells, 3)//'; put the cell where the bodies are')
+            error%place = int(bodies%global_index(s), lp)
+            return
+         end do
+      end associate
+   end subroutine check_place
 
    !> Check that no body that spans the cell moves along it, and that none turns, since its copies would not.
    subroutine check_walls(self, error)

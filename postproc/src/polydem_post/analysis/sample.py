@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..base.polygons import FloatArray
@@ -35,17 +33,17 @@ def sample_stress(frame: Frame, area: Rectangle) -> FloatArray:
     vectors at the edge of its window instead, and has the kinetic part.
     """
     contacts = frame.contacts
-    inside = inside_of(frame, area)
+    inside = copies_in(frame, area)
     total = np.zeros((2, 2))
     for index, arm, force in ((contacts.first_index, contacts.first_arm, contacts.force),
                               (contacts.second_index, contacts.second_arm, -contacts.force)):
-        total -= np.einsum("c,ci,cj->ij", inside[index].astype(float), arm, force)
+        total -= np.einsum("c,ci,cj->ij", inside[index], arm, force)
     return total / area_of_rectangle(area)
 
 
 def sample_fraction(frame: Frame, area: Rectangle) -> float:
     """Area of the free bodies whose centres are in a rectangle, over its area; `solid_fraction` cuts them there."""
-    return float(frame.area[inside_of(frame, area)].sum()) / area_of_rectangle(area)
+    return float((frame.area * copies_in(frame, area)).sum()) / area_of_rectangle(area)
 
 
 def shear_rate(frame: Frame, area: Rectangle, periodic: str = "none", jump: float | None = None) -> float:
@@ -54,7 +52,7 @@ def shear_rate(frame: Frame, area: Rectangle, periodic: str = "none", jump: floa
     The rates are those of the linear field of velocities that fits the bodies best (least squares). Along the axes of
     `periodic` (none, x, y or xy) the field does not change; `jump` is the rate of a sheared cell.
     """
-    inside = inside_of(frame, area)
+    inside = copies_in(frame, area) > 0
     axes = [axis for axis, name in enumerate("xy") if name not in periodic]
     gradient = np.zeros((2, 2))
     if axes and inside.any():
@@ -72,7 +70,7 @@ def inertial_number(frame: Frame, area: Rectangle, periodic: str = "none", jump:
     GDR MiDi, Eur. Phys. J. E 14 (2004) 341. d is the diameter of a circle with their mean area, rho their mass over
     their area, P half the trace of `sample_stress`; arguments as of `shear_rate`. NaN without pressure.
     """
-    inside = inside_of(frame, area)
+    inside = copies_in(frame, area) > 0
     pressure = 0.5 * float(np.trace(sample_stress(frame, area)))
     if not pressure > 0.0:
         return float("nan")
@@ -81,10 +79,27 @@ def inertial_number(frame: Frame, area: Rectangle, periodic: str = "none", jump:
     return float(shear_rate(frame, area, periodic, jump) * diameter * np.sqrt(density / pressure))
 
 
-def inside_of(frame: Frame, area: Rectangle) -> Any:
-    """Which bodies are free, and have their centres in a rectangle, its left and lower edges included, (n)."""
-    low, high = np.asarray(area[:2]), np.asarray(area[2:])
-    return frame.free & np.all((frame.position >= low) & (frame.position < high), axis=1)
+def copies_in(frame: Frame, area: Rectangle) -> FloatArray:
+    """How many copies of each free body have their centres in a rectangle, its left and lower edges included, (n).
+
+    In the plane 1 or 0, and also in a periodic cell if the rectangle is not longer than the cell.
+    """
+    first, last = _copies_between(frame.position[:, 1], area[1], area[3], frame.cell_size[1])
+    number = np.zeros(len(frame))
+    for row in range(int(first.min(initial=0.0)), int(last.max(initial=-1.0)) + 1):
+        begin, end = _copies_between(frame.position[:, 0] + row * frame.shift, area[0], area[2], frame.cell_size[0])
+        number += np.where((first <= row) & (row <= last), np.maximum(end - begin + 1.0, 0.0), 0.0)
+    return number * frame.free
+
+
+def _copies_between(place: FloatArray, low: float, high: float, period: float) -> tuple[FloatArray, FloatArray]:
+    """Numbers of the first and the last copies of places in an interval; one copy each if it is as long as the cell."""
+    if not period > 0.0:
+        return np.zeros(len(place)), np.where((place >= low) & (place < high), 0.0, -1.0)
+    first = np.ceil((low - place) / period)
+    if abs(high - low - period) <= 1e-6 * period:
+        return first, first
+    return first, np.ceil((high - place) / period) - 1.0
 
 
 def area_of_rectangle(area: Rectangle) -> float:

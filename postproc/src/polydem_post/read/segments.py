@@ -144,7 +144,7 @@ class FrameRows:
 
 
 #: Columns of /frames with one row per frame in any segment
-ROWS_OF_FRAMES = ("step", "time", "shift", "cell_low", "cell_size")
+ROWS_OF_FRAMES = ("step", "time", "shift", "jump", "cell_low", "cell_size")
 
 
 def _complete_frames(file: h5py.File) -> int:
