@@ -80,8 +80,8 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "wall.floor."),
                          {f"wall.floor.{key}=" for key in of["wall"]})
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "wall."), set())
-        quantities = set(re.findall(r'^    "(\w+)": Quantity\(', (
-            LAUNCHER.parent / "postproc/src/polydem_post/pictures/quantities.py").read_text(encoding="utf-8"), re.M))
+        source = LAUNCHER.parent / "postproc/src/polydem_post/pictures/quantities.py"
+        quantities = set(re.findall(r'^    "(\w+)": Quantity\(', source.read_text(encoding="utf-8"), re.MULTILINE))
         for verb in ("plot", "movie", "view"):
             self.assertEqual(self.completed("polydem", verb, "x", "--colour", ""), {*quantities, "none"})
             self.assertEqual(self.completed("polydem", verb, "x", "--color", "angl"), {"angle"})

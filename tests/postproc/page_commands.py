@@ -1,6 +1,6 @@
 """Blocks of commands on the pages, and what the tests do with them.
 
-A remark, which is a comment of Markdown, may stand just below a block, so that readers of the text meet the block first:
+A remark, which is a comment of Markdown, may stand just below a block, so that readers meet the block first:
 
     <!-- tests run: COMMANDS -->                the same commands, each with more words that make it short
     <!-- tests do not run this: REASON -->      an excuse

@@ -356,7 +356,7 @@ BENCHES = {
     ),
     "C6": of_drums(
         as_the_paper_says(),
-        several(quadtree={"exponent": 1.5, "time": 0.72}),
+        several(quadtree={"exponent": 1.5, "time": 0.65}),
         several(quadtree_called={"sway": 0.4}),
     ),
     "C10": [two_machines(1.3), two_machines(0.7), two_machines(1.0, noise=0.1)],

@@ -11,7 +11,7 @@ from polydem_post.base.result_file import ResultError, cannot_write
 from ..bench.series import SWEEP, TREE
 from ..bench.statistics import number
 from ..claims.rules_structure import FAILS
-from ..claims.verdicts import CONFIRMED, CONTRADICTED, OF_PARTS
+from ..claims.verdicts import CONFIRMED, CONTRADICTED, OF_PARTS, PARTS_BELOW
 from ..fine_grained.model import OBVIOUS
 from .report import Contents
 
@@ -96,7 +96,7 @@ def answers(tables: list) -> list[str]:
         tally = ", ".join(f"{row['number']} {row['verdict'].removeprefix(OF_PARTS)}" for row in parts)
         lines[-1] += f" Of their {sum(int(row['number']) for row in parts)} parts: {tally}."
     for verdict, said in ((CONFIRMED, "The paper is right"), (CONTRADICTED, "The paper is not right here")):
-        named = "; ".join(f"{row['says']} ({row['claim']})" for row in claims
+        named = "; ".join(f"{row['says']} ({_named(row, verdict)})" for row in claims
                           if row["verdict"] == verdict and row["claim"][1:].isdigit())
         lines.append(f"* **{said}**: {named or 'no claim as a whole'}.")
     failing = [(row["says"].removeprefix(FAILS), row["verdict"]) for row in claims if row["says"].startswith(FAILS)]
@@ -104,6 +104,11 @@ def answers(tables: list) -> list[str]:
         lines.append("* **The fine-grained parallel sweep fails** (C5): "
                      + "; ".join(f"{verdict} for {what}" for what, verdict in failing) + ".")
     return lines
+
+
+def _named(row: dict, verdict: str) -> str:
+    """A claim, and what was found in its place if it is not right."""
+    return f"{row['claim']}: {row['ours']}" if verdict == CONTRADICTED and row["ours"] != PARTS_BELOW else row["claim"]
 
 
 def which_finder(scenes: list[dict]) -> list[str]:

@@ -58,7 +58,7 @@ def what_fails(gains: Table, contest: Table | None = None, error: Table | None =
         axis.axis("off")
     above[0].set_ylabel("times as fast as one thread\nof sort_and_sweep")
     draw_waits(waits, rows, scenes)
-    draw_contest(wins, contest)
+    draw_contest(wins, contest or contest_of(rows))
     beside.axis("off")
     beside.legend(*wins.get_legend_handles_labels(), fontsize=7, loc="upper left")
     told = error_in(error)
@@ -72,8 +72,8 @@ def what_fails(gains: Table, contest: Table | None = None, error: Table | None =
         "the line at 1 threads pay. Titles: how far free boxes move in a step, over their side. Below left: barriers "
         "and locks of a step, counted, with the most threads that have a processor each. Below right: time of the "
         "sweep that works (partitioned_sweep) over that of the tree; above 1 the sweep loses. Filled: measured here, "
-        "lines: the model; open: measured on up to sixteen threads of another machine "
-        f"({sixteen()[0]['source']}). {told}".rstrip(),
+        "lines: the model, if there is one; open: measured on up to sixteen threads of another "
+        f"machine ({sixteen()[0]['source']}). {told}".rstrip(),
     )
 
 
@@ -139,6 +139,18 @@ def draw_waits(axis, rows: list[dict], scenes: list[str]) -> None:
     axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_xticks(range(len(scenes)), [scene.replace("_", "\n") for scene in scenes])
     axis.title.set_fontsize(8.5)
+
+
+def contest_of(rows: list[dict]) -> Table:
+    """The sweep over the tree on the drums of a table of gains, as medians and without a model."""
+    gains = {(row["finder"], row["scene"], row["threads"]): value_of(row["times as fast"]) for row in rows
+             if int(row["threads"]) == 1 or row in free_rows(rows)}
+    table = Table("fine_grained", "", ("scene", "threads", "sweep / tree", "model"))
+    for finder, scene, threads in gains:
+        if finder == PARTITIONED and (TREE, scene, threads) in gains:
+            ratio = gains[TREE, scene, threads] / gains[PARTITIONED, scene, threads]
+            table.add(scene, int(threads), number(ratio), "-")
+    return table
 
 
 def draw_contest(axis, contest: Table | None) -> None:

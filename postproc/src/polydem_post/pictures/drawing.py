@@ -190,7 +190,7 @@ def settle_frames(start: Frame, frames: Iterable[Frame], look: Look) -> SettledL
 
 
 def _shown(frame: Frame, values: list[np.ndarray], chosen: np.ndarray) -> list[np.ndarray]:
-    """Of the values of bodies and of their copies those of some bodies, and of their copies that reach into the cell."""
+    """Of the values of bodies and of their copies those of chosen bodies, and of their copies in the cell."""
     own, *copies = values
     return [own[chosen], *(values[chosen & _reaches_in(frame, shift)] for shift, values in zip(frame.shifts, copies))]
 
@@ -265,7 +265,7 @@ class Bodies:
 
 
 class CellOutline:
-    """The border of a periodic cell, with the ends of the borders of the copies above and below, which a shear moves."""
+    """The border of a periodic cell, with ends of the borders of the copies above and below, which a shear moves."""
 
     def __init__(self, axis: Axes, frame: Frame, look: SettledLook):
         self.artist = Line2D([], [], **CELL_OUTLINE)
@@ -294,7 +294,7 @@ def cell_lines(frame: Frame, look: SettledLook) -> list[FloatArray]:
 
 
 def _visible_cell(frame: Frame, look: SettledLook) -> FloatArray:
-    """Lower left and upper right corner of the periodic cell, along the other axis far beyond the limits, (2, 2) [m]."""
+    """Lower left and upper right corner of the periodic cell, along another axis beyond the limits, (2, 2) [m]."""
     low, high = np.array(look.limits[::2]), np.array(look.limits[1::2])
     ends = np.array([low - (high - low), high + (high - low)])
     return np.where(frame.cell_size > 0.0, [frame.cell_low, frame.cell_low + frame.cell_size], ends)

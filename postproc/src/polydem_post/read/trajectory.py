@@ -386,7 +386,7 @@ class Trajectory:
             material_names=names, **columns, **bodies, _source=self))
 
     def _jump(self, height: float, time: float) -> float:
-        """Velocity along x of the copy above a sheared cell of this height at a time [m/s] (`find_shear` of cell.f90)."""
+        """Velocity along x of the copy above a sheared cell of this height [m/s]; `find_shear` of cell.f90."""
         cell = self.settings.cell
         share = min(time / cell.shear_ramp, 1.0) if cell.get("shear_ramp", 0.0) > 0.0 else 1.0
         return float(cell.get("shear_rate", 0.0) * height * share**2 * (3.0 - 2.0 * share))
