@@ -2,6 +2,7 @@
 module polydem_motion_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_errors, only: error_t, input_error, raise, raise_unread
+   use polydem_file_status, only: is_stream
    use polydem_file_system, only: exists, is_folder
    use polydem_kinds, only: ip, wp
    use polydem_motion_table, only: greatest_rates, motion_table_t, prepare_table
@@ -54,6 +55,8 @@ contains
       path = table_path(settings, motion)
       if (is_folder(path, error)) then
          problem = path//': is a folder, not a CSV file'
+      else if (is_stream(path)) then
+         problem = path//': is a pipe or a device, not a CSV file; write the rows to a file'
       else if (.not. exists(path, error)) then
          problem = path//': no such file; the path is relative to the folder of the namelist'
       else if (.not. allocated(error)) then

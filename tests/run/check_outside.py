@@ -417,12 +417,41 @@ def the_parents_of_new_folders_are_brought_to_disk(case, library):
             assert lines[k + 1] == f"fsync {parent}", (folder, lines[k:k + 2])
 
 
+def pipes_are_refused_without_waiting_for_them(case):
+    """To open a pipe waits until somebody writes to it."""
+    os.mkfifo("pipe")
+    for text in ("&motion name = 'lift' wall = 'floor' kind = 'table' file = 'pipe' /\n"
+                 "&grains name = 'sand' region = 'box' low = 0, 1 high = 1, 2 number = 5 arrangement = 'spread' /\n",
+                 "&grains name = 'sand' region = 'box' low = 0, 1 high = 1, 2 number = 5 arrangement = 'spread' "
+                 "shape = 'outline' outlines = 'pipe' /\n"):
+        with open("piped.nml", "w", encoding="utf-8") as file:
+            file.write("&wall name = 'floor' outline = 'rectangle' low = 0, 0 high = 1, 0.1 /\n" + text +
+                       "&integrate duration = 1e-3 /\n")
+        code, _, message = case.call("check", "piped.nml")
+        assert_one_sentence(code, message, BAD_INPUT, "pipe or a device")
+    for name in sorted(os.listdir("whole")):
+        shutil.rmtree("piped", ignore_errors=True)
+        shutil.copytree("whole", "piped")
+        os.remove(f"piped/{name}")
+        os.mkfifo(f"piped/{name}")
+        for words in (["run", "scene.nml", "--set", "output.folder=piped", "--continue"], ["info", "piped", "--check"],
+                      ["info", "piped"]):
+            code, output, message = case.call(*words)
+            if code == GOOD:
+                # The older checkpoint is good, or the file is not read.
+                assert words[0] == "info" or hash_of(output) == case.expected, (name, output)
+            else:
+                assert code in (BAD_INPUT, NO_FILE), (name, words, code, message)
+                assert "pipe or a device" in message + output, (name, words, message, output)
+    shutil.rmtree("piped")
+
+
 TESTS = (too_many_threads_are_refused_before_anything_is_written,
          threads_that_openmp_or_the_system_do_not_grant_are_refused, threads_are_chosen_unless_they_are_given,
          variables_of_the_runtime_change_nothing, memory_that_is_not_granted_is_named,
          threads_that_take_turns_draw_a_warning, a_small_stack_is_refused, files_that_may_not_grow_are_named,
          nobody_need_read_what_is_printed, closed_streams_leave_files_alone,
-         a_umask_that_takes_ones_own_rights_is_refused)
+         a_umask_that_takes_ones_own_rights_is_refused, pipes_are_refused_without_waiting_for_them)
 
 
 def main():

@@ -6,7 +6,7 @@ module polydem_hdf5_handle
       h5pcreate_f, h5pset_istore_k_f, h5pset_libver_bounds_f, h5pset_link_phase_change_f, h5pset_userblock_f, hid_t, &
       hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise, raise_unread
-   use polydem_file_status, only: is_shared
+   use polydem_file_status, only: is_shared, is_stream
    use polydem_file_system, only: check_access, disk_hint, errno_message, exists, is_folder, remove_file
    use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
    use polydem_hdf5_dataset, only: dataset_shape, has_link, start_library
@@ -150,6 +150,7 @@ contains
 
       if (.not. exists(path, error)) call raise(error, input_error, path//': there is no such file')
       if (is_folder(path, error)) call raise(error, input_error, path//': is a folder, not a file')
+      if (is_stream(path)) call raise(error, input_error, path//': is a pipe or a device, not an HDF5 file')
       if (.not. allocated(error)) call start_library(error)
       if (allocated(error)) return
       self%path = path

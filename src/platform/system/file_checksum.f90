@@ -8,6 +8,7 @@ module polydem_file_checksum
    use, intrinsic :: iso_fortran_env, only: iostat_end
    use polydem_crc32, only: crc32_t, new_crc32
    use polydem_errors, only: error_t, io_error, raise, raise_unread
+   use polydem_file_status, only: is_stream, stream_reason
    use polydem_file_system, only: find_length, overwrite_start
    use polydem_kinds, only: bp, ip, lp
    use polydem_strings, only: to_text
@@ -60,6 +61,8 @@ contains
       character(len=checksum_length) :: checksum_line, expected
       integer :: unit, status
 
+      if (is_stream(path)) call raise_unread(error, path, stream_reason)
+      if (allocated(error)) return
       open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
       if (status == 0) then
@@ -91,6 +94,8 @@ contains
 
       bytes = 0_lp
       checksum = ''
+      if (is_stream(path)) call raise_unread(error, path, stream_reason)
+      if (allocated(error)) return
       open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
       if (status == 0) then

@@ -1,9 +1,10 @@
-!> Status of files (Linux): kind, number of names and identity, of a name itself and never of the target of a link.
+!> Status of files (Linux): kind, number of names and identity, of a name itself and not of the target of a link, except
+!> in `is_stream`.
 module polydem_file_status
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int16_t, c_int32_t, c_int64_t, c_null_char
    implicit none
    private
-   public :: is_name_of, is_link, is_shared
+   public :: is_name_of, is_link, is_shared, is_stream, stream_reason
 
    !> struct statx of Linux, the same on all processors
    type, bind(C) :: statx_t
@@ -25,12 +26,17 @@ module polydem_file_status
       integer(c_int64_t) :: rest(14)
    end type statx_t
 
+   !> Why such a file is not read
+   character(len=*), parameter :: stream_reason = 'it is a pipe or a device, not a file'
+
    !> AT_FDCWD, AT_SYMLINK_NOFOLLOW and AT_EMPTY_PATH of openat(2)
    integer(c_int), parameter :: working_directory = -100_c_int, name_itself = 256_c_int, open_file = 4096_c_int
    !> STATX_BASIC_STATS of statx(2)
    integer(c_int), parameter :: basic = int(z'7ff', c_int)
    !> Bits of the kind of a file, and kinds: link, regular file
    integer, parameter :: kind_bits = int(o'170000'), link_kind = int(o'120000'), regular_kind = int(o'100000')
+   !> Kind of a folder
+   integer, parameter :: folder_kind = int(o'040000')
 
    interface
       !> statx(2)
@@ -78,6 +84,16 @@ contains
       if (is_shared) is_shared = kind_of(status) == link_kind .or. &
                                  (kind_of(status) == regular_kind .and. status%n_names > 1_c_int32_t)
    end function is_shared
+
+   !> Whether a path names a pipe, a socket or a device, also by a link: to open one may wait for ever
+   logical function is_stream(path)
+      !> The path
+      character(len=*), intent(in) :: path
+      type(statx_t) :: status
+
+      is_stream = c_statx(working_directory, path//c_null_char, 0_c_int, basic, status) == 0_c_int
+      if (is_stream) is_stream = kind_of(status) /= regular_kind .and. kind_of(status) /= folder_kind
+   end function is_stream
 
    !> Whether the status of a path is known
    logical function is_known(path, status)

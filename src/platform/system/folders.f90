@@ -4,6 +4,7 @@ module polydem_folders
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_loc, c_null_char, c_null_ptr, &
       c_ptr
    use polydem_errors, only: error_t, raise_unread
+   use polydem_file_status, only: is_stream, stream_reason
    use polydem_file_system, only: decide_existence, find_length, last_failure
    use polydem_kinds, only: lp
    use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, clear_error_number, &
@@ -88,6 +89,8 @@ contains
       integer :: status, unit
 
       text = ''
+      if (is_stream(path)) call raise_unread(error, path, stream_reason)
+      if (allocated(error)) return
       open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
       if (status == 0) then
