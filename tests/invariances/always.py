@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
-#: Residual of the energy relative to the greatest kinetic energy or work, and of the momentum. The first is the error of
-#: integration; the second is rounding with velocity Verlet.
+#: Residual of the energy relative to the greatest kinetic energy or work, and of the momentum. The first is the error
+#: of integration; the second is rounding with velocity Verlet.
 ENERGY, MOMENTUM = 0.1, 1e-9
 #: What the balance says and what the frames give, relative to the greatest
 AGREES = 1e-9
@@ -71,8 +71,9 @@ def wall_works(scene, answer):
     """Work of a wall that only shifts is its force times its displacement."""
     series = answer.series
     for name in scene.named("wall"):
-        if f"{name}.work" not in series or {"motion_rotation", "motion_table", "load_hinged", "motion_conveyor"} & set().union(
-                *(scene.acts.get(k, set()) for k in scene.groups[f"wall.{name}"]["bodies"])):
+        acting = set().union(*(scene.acts.get(k, set()) for k in scene.groups[f"wall.{name}"]["bodies"]))
+        if f"{name}.work" not in series or acting & {"motion_rotation", "motion_table", "load_hinged",
+                                                     "motion_conveyor"}:
             continue
         work = np.zeros(len(series["time"]))
         total = np.zeros(len(work))

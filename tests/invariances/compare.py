@@ -1,7 +1,7 @@
 """What two answers have in common, and what every answer must have.
 
-Poses and velocities are compared frame by frame, until rounding has grown: the bound follows from runs of the same scene
-whose places and velocities differ in the last bits.
+Poses and velocities are compared frame by frame, until rounding has grown: the bound follows from runs of the same
+scene whose places and velocities differ in the last bits.
 """
 
 from dataclasses import dataclass, field
@@ -74,7 +74,7 @@ def speed_of(scene, answer):
 def bound_of(scene, answer, disturbed):
     """Bound from runs with other last bits; None if one of them ended otherwise."""
     bound = Bound(scene.size, speed_of(scene, answer))
-    scale = max((max(abs(answer.balance[key]).max() for key in ENERGIES)), 1e-300) if answer.balance else 1.0
+    scale = max(*(abs(answer.balance[key]).max() for key in ENERGIES), 1e-300)
     worst = np.zeros(4)
     strongest = max(abs(frame.wall_force).max() for frame in answer.frames)
     others = [{frame.step: (k, frame) for k, frame in enumerate(other.frames)} for other in disturbed]

@@ -11,7 +11,8 @@ from always import faults, impact
 from compare import bound_of, differences
 from draw import draw
 from runs import Play, play
-from transforms import INVARIANCES, excepted, impossible_pairs, read_table
+from tables import excepted, impossible_pairs, read_table
+from transforms import INVARIANCES
 
 #: Runs with other last bits, and by how much [relative to the greatest coordinate and speed]
 DISTURBED, BITS = 2, 2e-15
@@ -100,7 +101,7 @@ def touching_pairs(scene, answer):
             if frame.size is not None:
                 a, b = frame.row(one), frame.row(two)
                 apart = abs(frame.position[a] - frame.position[b])
-                if int(one) not in answer.fixed and int(two) not in answer.fixed or "rows" in act:
+                if (int(one) not in answer.fixed and int(two) not in answer.fixed) or "rows" in act:
                     across = [axis for axis in scene.periodic if apart[axis] > 0.5*frame.size[axis]]
                     if across and ("sheared" not in scene.tags or 1 in across):
                         act |= scene.tags & {"periodic_x", "periodic_y", "periodic_xy", "sheared"}
@@ -114,6 +115,8 @@ class Choice:
 
     program: Path
     folder: Path
+    #: The program with MPI, if runs of several ranks are tried
+    parallel: Path = None
     keep: bool = False
     #: Names of invariances; empty: all
     only: frozenset = frozenset()
@@ -137,8 +140,8 @@ def examine(seed, choice):
 
 def look(scene, report, choice, home):
     """Run a scene, judge its answer, and compare it with those of its copies."""
-    answer = play(choice.program, begin(scene), home/"scene")
-    if answer.crashed or answer.refused and not answer.reason:
+    answer = play([choice.program], begin(scene), home/"scene")
+    if answer.crashed or (answer.refused and not answer.reason):
         report.fate = "crashed"
         report.find("scene", f"ended with code {answer.code}: {answer.reason}")
         return
@@ -170,7 +173,9 @@ class Beside:
         for name in names:
             if self.choice.most and len(self.report.compared) >= self.choice.most:
                 return
-            if self.choice.only and name not in self.choice.only or excepted(self.scene, name, table):
+            if name == "ranks" and self.choice.parallel is None:
+                continue
+            if (self.choice.only and name not in self.choice.only) or excepted(self.scene, name, table):
                 continue
             case = INVARIANCES[name](self.scene, random.Random(f"{self.report.seed} {name}"))
             if case is not None:
@@ -181,7 +186,8 @@ class Beside:
             # The series costs a third of a run, and only checks of a run alone need it.
             for part in case.parts:
                 sparse(part.scene)
-        other = play(self.choice.program, prelude_of(self.scene, case.parts), self.home/name)
+        command = [self.choice.program] if case.ranks == 0 else ["mpirun", "-n", str(case.ranks), self.choice.parallel]
+        other = play(command, prelude_of(self.scene, case.parts), self.home/name)
         text = ""
         if other.code != 0:
             word = "crashed" if other.crashed else "refused" if other.refused else "stopped"
@@ -201,6 +207,6 @@ class Beside:
         """Run the scene with other last bits."""
         scene = self.scene
         scale = max(abs(piece).max() for body in scene.bodies for piece in body.pieces) + scene.size
-        others = [play(self.choice.program, begin(disturbed(scene, random.Random(f"{self.report.seed} {k}"), scale)),
+        others = [play([self.choice.program], begin(disturbed(scene, random.Random(f"{self.report.seed} {k}"), scale)),
                        self.home/f"disturbed_{k}") for k in range(DISTURBED)]
         return bound_of(scene, self.answer, others)

@@ -1,7 +1,7 @@
 """Run drawn scenes beside copies whose answer is known, and print what differs.
 
 usage: run_invariances.py PROGRAM [--seed N] [--count N] [--seconds S] [--most N] [--only NAME,...] [--jobs N]
-                          [--folder FOLDER] [--keep] [--pairs FILE]
+                          [--folder FOLDER] [--keep] [--pairs FILE] [--mpi PROGRAM]
 
 The Python of .venv runs it if that of the command lacks h5py. Exit code 1: something differs.
 """
@@ -35,6 +35,7 @@ def options():
     parser.add_argument("--folder", type=Path, help="where runs are")
     parser.add_argument("--keep", action="store_true", help="keep all runs")
     parser.add_argument("--pairs", type=Path, help="CSV file of pairs of capabilities and their numbers of scenes")
+    parser.add_argument("--mpi", type=Path, help="program with MPI, for runs of several ranks")
     return parser.parse_args()
 
 
@@ -59,13 +60,14 @@ def main():
     given = options()
     folder = given.folder or Path(tempfile.mkdtemp(prefix="invariances_"))
     folder.mkdir(parents=True, exist_ok=True)
-    choice = Choice(given.program.resolve(), folder.resolve(), given.keep, frozenset(filter(None, given.only.split(","))),
-                    given.most)
+    choice = Choice(given.program.resolve(), folder.resolve(), given.mpi and given.mpi.resolve(), given.keep,
+                    frozenset(filter(None, given.only.split(","))), given.most)
     reports = []
     for report in reports_of(choice, given):
         reports.append(report)
         for finding in report.findings:
-            print(f"{finding.seed:7} {finding.invariance:16} {finding.text}\n{'':24} {' '.join(finding.tags)}", flush=True)
+            print(f"{finding.seed:7} {finding.invariance:16} {finding.text}\n{'':24} {' '.join(finding.tags)}",
+                  flush=True)
     print_summary(reports)
     if given.pairs:
         write_pairs(given.pairs, reports)
@@ -98,8 +100,8 @@ def print_summary(reports):
 
 def pair_counts(reports):
     """Number of scenes in which two capabilities acted on one touching body, by pair that is possible."""
-    from draw import CAPABILITIES, alternatives
-    from transforms import impossible_pairs
+    from capabilities import CAPABILITIES, alternatives
+    from tables import impossible_pairs
 
     impossible = impossible_pairs()
     counts = collections.Counter(pair for report in reports for pair in report.pairs)
@@ -116,7 +118,7 @@ def write_pairs(path, reports):
 
 if __name__ == "__main__":
     try:
-        import h5py    # noqa: F401
+        import h5py  # noqa: F401
     except ImportError:
         if Path(sys.executable) == PYTHON or not PYTHON.exists():
             sys.exit(f"{sys.executable} lacks h5py; ./polydem test makes an environment that has it")

@@ -11,10 +11,14 @@ from dataclasses import dataclass, field
 
 import h5py
 import numpy as np
+
 from scene import BODIES, NAMELIST, write_bodies, write_namelist, write_tables
 
 #: How one small run is started; threads that wait sleep
-ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive"}
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive",
+               "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1",
+               "OMPI_MCA_hwloc_base_binding_policy": "none", "OMPI_ALLOW_RUN_AS_ROOT": "1",
+               "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 #: Seconds after which a run hangs: a thousand times what it takes
 PATIENCE = 120
 #: Exit code of a namelist that is refused, and of a run that a guard stops
@@ -93,8 +97,11 @@ class Answer:
         return re.sub(r"^\S+\.nml:\d+: ", "", (lines or self.message.splitlines() or [""])[0].removeprefix("polydem: "))
 
 
-def play(program, parts, folder):
-    """Run a play in a folder that does not exist; give the answer of its last run."""
+def play(command, parts, folder):
+    """Run a play in a folder that does not exist; give the answer of its last run.
+
+    `command` is the program, with what stands before it.
+    """
     folder.mkdir(parents=True)
     answer, before = None, None
     for number, part in enumerate(parts):
@@ -122,7 +129,7 @@ def play(program, parts, folder):
         if not part.begins:
             write_bodies(folder / BODIES, scene)
         write_tables(folder, scene)
-        answer = one_run(program, folder, name, ["--continue"] if part.begins == "continue" else [])
+        answer = one_run(command, folder, name, ["--continue"] if part.begins == "continue" else [])
         if answer.code != 0:
             break
         before = target
@@ -137,9 +144,9 @@ def last_cell(folder):
         return {"low": list(file["frames/cell_low"][-1]), "size": list(file["frames/cell_size"][-1])}
 
 
-def one_run(program, folder, name, options):
+def one_run(command, folder, name, options):
     """Run the program once."""
-    command = [str(program), "run", name, "--threads", "1", *options]
+    command = [*command, "run", name, "--threads", "1", *options]
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=ENVIRONMENT,
                               timeout=PATIENCE, stdin=subprocess.DEVNULL)

@@ -1,7 +1,7 @@
 """A scene as data, and the files that the program reads.
 
-A scene has bodies, which may be walls, and groups of entries. One table says what kind of quantity each entry is, so that
-a scene can be turned, mirrored, shifted, or written in other units, without a line for each entry.
+A scene has bodies, which may be walls, and groups of entries. One table says what kind of quantity each entry is, so
+that a scene can be turned, mirrored, shifted, or written in other units, without a line for each entry.
 """
 
 import copy
@@ -45,8 +45,8 @@ KINDS = {
 #: Entries without unit and direction
 PLAIN = set("""wall.outline wall.bodies motion.kind motion.wall motion.file motion.stage load.wall load.damping_ratio
 load.stage cell.damping_ratio cell.stage cell.profile source.count source.interval source.shape source.angle
-source.stage source.material source.outline_corners sink.interval sink.stage stage.until stage.below stage.above stage.check
-stage.at_limit stage.friction_scale stage.sink sample.area forces.law forces.damping forces.restitution
+source.stage source.material source.outline_corners sink.interval sink.stage stage.until stage.below stage.above
+stage.check stage.at_limit stage.friction_scale stage.sink sample.area forces.law forces.damping forces.restitution
 forces.damping_coefficient forces.damping_from_touch forces.tilt_damping forces.friction forces.friction_coefficient
 forces.tangential_stiffness forces.midstep_slip forces.rolling_friction forces.local_damping material.restitution
 material.damping_coefficient material.friction_coefficient material.tangential_stiffness material.rolling_friction
@@ -87,6 +87,11 @@ class Body:
     @property
     def centre(self):
         return self.area_and_centre()[1]
+
+    def copied(self, identifier):
+        """A copy with another identifier."""
+        return Body(identifier, [piece.copy() for piece in self.pieces], self.fixed, self.velocity.copy(), self.spin,
+                    self.density, self.material)
 
     def move(self, by):
         self.pieces = [piece + by for piece in self.pieces]
@@ -208,37 +213,37 @@ def map_group(kind, group, change):
         for key in {"below", "above"} & set(old):
             group[key] = change.unit((2, 1, -2))*old[key]
     for key, value in old.items():
-        if f"{kind}.{key}" in PLAIN:
-            continue
-        what, *powers = KINDS[f"{kind}.{key}"]
-        unit = change.unit(powers)
-        if what == "scalar":
-            group[key] = unit*value
-        elif what == "spin":
-            group[key] = unit*change.sense*value
-        elif what == "point":
-            group[key] = list(change.point(value))
-        elif what == "vector":
-            group[key] = list(change.vector(value, powers))
-        elif what == "extent":
-            group[key] = list(unit*(np.abs(change.matrix) @ np.asarray(value)))
-        elif what == "along":
-            axis = "xy".find(old["direction"])
-            group[key] = unit*value*change.matrix[:, axis].sum()
-        elif what == "axes":
-            group[key] = {"x": "y", "y": "x"}.get(value, value) if change.turns_axes else value
-        elif what == "outline":
-            points = np.asarray(value).reshape(-1, 2)
-            group[key] = list(change.vector(points, powers)[::int(change.sense)].ravel())
-            if change.sense < 0 and "outline_corners" in group:
-                group["outline_corners"] = group["outline_corners"][::-1]
+        if f"{kind}.{key}" not in PLAIN:
+            what, *powers = KINDS[f"{kind}.{key}"]
+            if what not in ("low", "high"):
+                group[key] = MAPPED[what](value, powers, change, old)
+    if "outline" in group and kind == "source" and change.sense < 0 and "outline_corners" in group:
+        group["outline_corners"] = group["outline_corners"][::-1]
     if "low" in old:
-        size = "size" in old
-        low, high = np.asarray(old["low"]), np.asarray(old["size" if size else "high"])
-        ends = change.point([low, low + high if size else high])
+        low, other = np.asarray(old["low"]), np.asarray(old["high"] if "high" in old else old["size"])
+        ends = change.point([low, other if "high" in old else low + other])
         group["low"] = list(ends.min(axis=0))
-        if not size:
+        if "high" in old:
             group["high"] = list(ends.max(axis=0))
+
+
+def mapped_outline(value, powers, change, _):
+    """Corners relative to a place, anticlockwise again."""
+    return list(change.vector(np.asarray(value).reshape(-1, 2), powers)[::int(change.sense)].ravel())
+
+
+#: How an entry of each kind is mapped: from value, powers of its unit, change, and the other entries of its group
+MAPPED = {
+    "scalar": lambda value, powers, change, _: change.unit(powers)*value,
+    "spin": lambda value, powers, change, _: change.unit(powers)*change.sense*value,
+    "point": lambda value, powers, change, _: list(change.point(value)),
+    "vector": lambda value, powers, change, _: list(change.vector(value, powers)),
+    "extent": lambda value, powers, change, _: list(change.unit(powers)*(np.abs(change.matrix) @ np.asarray(value))),
+    "along": lambda value, powers, change, group: (
+        change.unit(powers)*value*change.matrix[:, "xy".find(group["direction"])].sum()),
+    "axes": lambda value, powers, change, _: {"x": "y", "y": "x"}.get(value, value) if change.turns_axes else value,
+    "outline": mapped_outline,
+}
 
 
 def text_of(value):
