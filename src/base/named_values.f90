@@ -7,7 +7,7 @@ module polydem_named_values
    private
    public :: named_values_t
 
-   !> Maximum length of the name of an entry
+   !> Maximum length of the name of an entry: a name of the namelist, a dot and a word
    integer, parameter :: name_length = 80
    !> Maximum length of the unit of an entry
    integer, parameter :: unit_length = 16

@@ -18,8 +18,9 @@ module polydem_bodies
    use polydem_polygon, only: diameter, greatest_radius, thickness
    implicit none
    private
-   public :: bodies_t, piece_identifiers, allocate_bodies, allocate_with_corners, measure_bodies, turn_bodies, &
-      turn_block, find_directions, block_size, measure_sizes, state_hash, state_words, image_word
+   public :: bodies_t, piece_identifiers, greatest_identifier, allocate_bodies, allocate_with_corners, &
+      measure_bodies, turn_bodies, turn_block, find_directions, block_size, measure_sizes, state_hash, &
+      state_words, image_word
 
    !> Greatest number of bodies of a block for `turn_block`
    integer(ip), parameter :: block_size = 64_ip
@@ -132,6 +133,14 @@ contains
          bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + corners(s)
       end do
    end subroutine allocate_with_corners
+
+   !> Greatest identifier that a body may have, so that its pieces have identifiers, too
+   pure integer(ip) function greatest_identifier(most)
+      !> Greatest number of pieces of a body of the run
+      integer(ip), intent(in) :: most
+
+      greatest_identifier = huge(1_ip)/most - 1_ip
+   end function greatest_identifier
 
    !> Identifiers of all pieces: that of the body times the greatest number of pieces, plus the number in the body. They
    !> ascend; if every body has one piece, they are those of the bodies.

@@ -1,6 +1,6 @@
 !> A list to which generators and readers append bodies one by one, and its conversion to the arrays of `bodies_t`.
 module polydem_body_list
-   use polydem_bodies, only: allocate_bodies, bodies_t, measure_bodies, turn_bodies
+   use polydem_bodies, only: allocate_bodies, bodies_t, greatest_identifier, measure_bodies, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_piece_properties, only: join_pieces
@@ -259,9 +259,9 @@ contains
       bodies%pieces%most = list%most_pieces
       if (list%most_pieces == 1_ip) return
       allocate (bodies%pieces%number(size(bodies%pieces%vertex, 2)), source=0_ip)
-      if (bodies%last_id < huge(1_ip)/list%most_pieces) return
+      if (bodies%last_id <= greatest_identifier(list%most_pieces)) return
       call raise(error, input_error, 'body '//to_text(bodies%last_id)//': with up to '//to_text(list%most_pieces)// &
-                 ' pieces of a body, identifiers must be less than '//to_text(huge(1_ip)/list%most_pieces)// &
+                 ' pieces of a body, identifiers must be at most '//to_text(greatest_identifier(list%most_pieces))// &
                  '; number the bodies anew')
    end subroutine check_identifiers
 

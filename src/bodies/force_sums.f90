@@ -18,6 +18,7 @@ module polydem_force_sums
    public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential, sum_x, sum_y
    public :: sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of, reserve_terms
    public :: append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
+   public :: energy_of_contact
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
@@ -149,17 +150,42 @@ contains
             first(7, c) = elastic*lever_first
             first(8, c) = normal*lever_first + block%twist(c)
             first(9, c) = tangential*(block%arm_first(c, 1)*x + block%arm_first(c, 2)*y)
-            first(10, c) = 0.25_wp*block%elastic(c)*block%area(c)/block%length(c)
+            first(10, c) = 0.5_wp*contact_energy(block%elastic(c), block%area(c), block%length(c))
             second(7, c) = -elastic*lever_second
             second(8, c) = -(normal*lever_second + block%twist(c))
             second(9, c) = -tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
             second(10, c) = first(10, c)
          end do
       end associate
-      if (block%has_cohesion) terms%first(10, :block%n) = terms%first(10, :block%n) &
-         + 0.5_wp*block%cohesion(:block%n)*block%area(:block%n)/block%length(:block%n)
-      if (block%has_cohesion) terms%second(10, :block%n) = terms%first(10, :block%n)
+      if (.not. block%has_cohesion) return
+      terms%first(10, :block%n) = 0.5_wp*contact_energy(block%elastic(:block%n), block%area(:block%n), &
+                                                        block%length(:block%n), block%cohesion(:block%n))
+      terms%second(10, :block%n) = terms%first(10, :block%n)
    end subroutine terms_of_block
+
+   !> Energy of a contact of a table [J/m]
+   pure real(wp) function energy_of_contact(contacts, c) result(energy)
+      type(contacts_t), intent(in) :: contacts
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+
+      if (contacts%has_cohesion) then
+         energy = contact_energy(contacts%elastic(c), contacts%area(c), contacts%length(c), contacts%cohesion(c))
+      else
+         energy = contact_energy(contacts%elastic(c), contacts%area(c), contacts%length(c))
+      end if
+   end function energy_of_contact
+
+   !> Energy of a contact [J/m]: exact for laws whose contacts have one, else an estimate
+   elemental real(wp) function contact_energy(elastic, area, length, cohesion) result(energy)
+      !> Elastic repulsion [N/m], area [m2] and length [m] of the contact
+      real(wp), intent(in) :: elastic, area, length
+      !> Cohesive force, if there is cohesion [N/m]
+      real(wp), intent(in), optional :: cohesion
+
+      energy = 0.5_wp*elastic*area/length
+      if (present(cohesion)) energy = energy + cohesion*area/length
+   end function contact_energy
 
    !> Term of one body of a contact. The energy of a contact is divided between its two bodies.
    pure function term_of(terms, c, is_first) result(term)

@@ -245,7 +245,7 @@ def manual(rows):
         default = f"`'{row.default}'`" if is_text and row.default != "required" else row.default
         allowed = ", ".join(row.allowed.split()) if row.type == "word" else row.allowed
         if row.type == "name":
-            allowed = f"name of a &{row.allowed}" if row.allowed else "letters, digits, _"
+            allowed = f"name of a &{row.allowed}" if row.allowed else "at most 64 letters, digits, _"
         if row.usual:
             allowed += f"; usual: {row.usual.partition(': ')[0]}"
         key, _, words = row.needs.rpartition(":")

@@ -194,9 +194,9 @@ contains
       call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine compute_forces
 
-   !> After a failure, make the table of contacts of this step if the step has not kept it, and the forces on fixed
-   !> bodies. Collective. Such a table shows the contacts of the state at the stop, with the forces of a time step of
-   !> length 0. It is empty if the step failed before it found contacts.
+   !> After a failure, make the table of contacts of this step, and the forces on fixed bodies. Collective. The table
+   !> shows the contacts of the state at the stop, with the forces of a time step of length 0, whoever needed a table in
+   !> this step. A velocity constraint keeps its own. The table is empty if the step failed before it found contacts.
    subroutine tabulate_contacts(self)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable :: known_error
@@ -211,7 +211,7 @@ contains
          self%contacts%n = 0_ip
          return
       end if
-      if (self%settings%output%contacts .and. .not. self%loop%has_table) then
+      if (self%settings%output%contacts .and. .not. allocated(self%law%constraint)) then
          ! The end of the step changed velocities, and poses with some integrators.
          if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
          call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])

@@ -194,3 +194,33 @@ def test_exports_have_the_bodies_of_each_frame(result, tmp_path, form, end):
     if form == "csv":
         rows = len((tmp_path / "flow.csv").read_text(encoding="utf-8").splitlines()) - 1
         assert rows == sum(len(frame) for frame in trajectory)
+
+
+@pytest.mark.parametrize("last, count, code", [
+    (715_827_880, 40, 2), (715_827_881, 40, 2), (2_147_483_646, 40, 2), (715_827_840, 40, 0), (1000, 0, 0),
+    (715_827_870, 0, 1)])
+def test_identifiers_of_pieces_fit_their_bits(last, count, code, tmp_path):
+    """A source of crosses of three pieces beside squares with great identifiers: 3 (id + 1) must be less than 2^31."""
+    with h5py.File(tmp_path / "bodies.h5", "w") as file:
+        file["vertex"] = [(x + 0.01 * i, y + 0.01 * j) for x, y in ((-0.03, 0.05), (0.0, 0.05), (0.03, 0.05))
+                          for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        file["vertex_start"] = [0, 4, 8, 12]
+        file["fixed"] = [1, 0, 0]
+        file["id"] = [1, 2, last]
+    rate = f"count = {count}" if count else "rate = 3000"
+    (tmp_path / "scene.nml").write_text(
+        f"&scene\n  bodies_file = '{tmp_path}/bodies.h5' /\n"
+        f"&source name = 'feed' low = -0.03, 0.1 high = 0.03, 0.2 {rate}\n"
+        "  interval = 50 shape = 'cross' width = 5e-3 arm = 2e-3 /\n&integrate dt = 5e-5 duration = 0.01 /\n",
+        encoding="utf-8")
+    done = subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", tmp_path / "scene.nml", "--set",
+                           f"output.folder={tmp_path}/result"], check=False, capture_output=True, text=True)
+    assert done.returncode == code, done
+    if code == 2:
+        assert re.search(rf"scene.nml:2: body {last}: with up to 3 pieces of a body and \d+ more bodies, identifiers "
+                         r"must be at most \d+; number the bodies anew, from 1", done.stderr), done.stderr
+    if code == 1:
+        assert re.search(r"step \d+: there are no identifiers for \d+ more bodies behind \d+: 715827881 is the "
+                         r"greatest, with up to 3 pieces of a body", done.stderr), done.stderr
+    if code == 0:
+        assert max(Trajectory(tmp_path / "result")[-1].id) > last

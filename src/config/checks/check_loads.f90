@@ -30,6 +30,10 @@ contains
             call check_width(settings%load(k), instance, error)
             call check_weight(settings, settings%load(k), instance, error)
             call check_direction(settings, k, instance, error)
+            if (.not. settings%output%series_interval > 0.0_wp) cycle
+            if (index_of_instance(instances, 'wall', settings%load(k)%name) > 0) call blame(instance, 'name', &
+               'is that of a wall; both would have a column '//settings%load(k)%name//'.work in the series. Give '// &
+               'the load another name', error)
          end associate
       end do
    end subroutine check_loads

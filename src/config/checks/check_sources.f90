@@ -46,6 +46,9 @@ contains
          associate (sink => settings%sink(k), &
                     instance => instances(index_of_instance(instances, 'sink', settings%sink(k)%name)))
             if (.not. all(sink%low < sink%high)) call blame(instance, 'high', corner, error, 'low')
+            if (.not. settings%output%series_interval > 0.0_wp) cycle
+            if (index_of_instance(instances, 'source', sink%name) > 0) call blame(instance, 'name', 'is that of a '// &
+               'source; both would have a column '//sink%name//'.mass in the series. Give the sink another name', error)
          end associate
       end do
       if (settings%output%trace_steps > 0 .and. size(settings%source) + size(settings%sink) > 0) then

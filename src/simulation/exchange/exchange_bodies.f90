@@ -15,6 +15,7 @@ module polydem_exchange_bodies
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
+   use polydem_force_sums, only: energy_of_contact
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_replace_bodies, only: replace_bodies
@@ -113,9 +114,7 @@ contains
             do c = 1_ip, contacts%n
                if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
                if (stays(contacts%first(c)) .and. stays(contacts%second(c))) cycle
-               call released(1)%add(0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c))
-               if (contacts%has_cohesion) &
-                  call released(1)%add(contacts%cohesion(c)*contacts%area(c)/contacts%length(c))
+               call released(1)%add(energy_of_contact(contacts, c))
             end do
          end if
       end associate

@@ -7,7 +7,7 @@
 !> Slots and global indices change; identifiers do not, and none is used twice. The caller tells the energy balance what
 !> the bodies bring and take (`polydem_changed_bodies`); the channels of new bodies begin as at time 0.
 module polydem_replace_bodies
-   use polydem_bodies, only: bodies_t, piece_identifiers, turn_bodies
+   use polydem_bodies, only: bodies_t, greatest_identifier, piece_identifiers, turn_bodies
    use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_changed_bodies, only: start_entering
@@ -51,8 +51,12 @@ contains
       integer(ip), allocatable :: removed(:), slots(:)
       integer(ip) :: s
 
-      if (self%bodies%last_id > huge(1_ip)/self%bodies%pieces%most - 1_ip - added%n_all) call raise(error, run_error, &
-         'step '//to_text(self%step)//': there are no identifiers for more bodies')
+      associate (last => self%bodies%last_id, greatest => greatest_identifier(self%bodies%pieces%most))
+         if (last > greatest - added%n_all) call raise(error, run_error, 'step '//to_text(self%step)//': there are '// &
+            'no identifiers for '//to_text(added%n_all)//' more bodies behind '//to_text(last)//': '// &
+            to_text(greatest)//' is the greatest, with up to '//to_text(self%bodies%pieces%most)//' pieces of a '// &
+            'body, and none is used twice. Give the bodies of the start lower ones, from 1')
+      end associate
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call list_removed(self%comm, self%bodies, kept, removed)

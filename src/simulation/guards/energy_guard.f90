@@ -2,15 +2,16 @@
 !>
 !> The sum of kinetic energy, gravitational potential energy and energy dissipated by damping and friction may increase
 !> only by the work of the walls and by the elastic energy that the contacts stored at the start of the energy balance,
-!> estimated as half of force times depth. Any further increase is unexplained. It is compared with the energy turned
-!> over. A non-conservative force law, such as the area law, contributes a few per cent of the work of a contact, with
-!> either sign.
+!> as `energy_of_contact` has it, with that of cohesion. Any further increase is unexplained. It is compared with the
+!> energy turned over. A non-conservative force law, such as the area law, contributes a few per cent of the work of a
+!> contact, with either sign.
 module polydem_energy_guard
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_contacts, only: contacts_t
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
+   use polydem_force_sums, only: energy_of_contact
    use polydem_global_reductions, only: sum_exactly
    use polydem_guard, only: guard_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -46,7 +47,7 @@ contains
          simulation%comm, simulation%bodies, simulation%contacts, self%stored)
    end subroutine start
 
-   !> Find the elastic energy of the contacts of all ranks, estimated as half of force times depth. Collective.
+   !> Find the elastic energy of the contacts of all ranks, with that of cohesion. Collective.
    subroutine find_stored_energy(comm, bodies, contacts, stored)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
@@ -60,7 +61,7 @@ contains
       allocate (terms(contacts%n), source=0.0_wp)
       do c = 1_ip, contacts%n
          if (owns_pair(bodies, contacts%first(c), contacts%second(c))) &
-            terms(c) = 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
+            terms(c) = energy_of_contact(contacts, c)
       end do
       call sum_exactly(comm, terms, stored)
    end subroutine find_stored_energy

@@ -1,7 +1,7 @@
 !> Start of a simulation at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
    use polydem_begin_stage, only: continue_stages, prepare_stages
-   use polydem_bodies, only: bodies_t
+   use polydem_bodies, only: bodies_t, greatest_identifier
    use polydem_box_maker, only: update_boxes
    use polydem_check_traffic, only: check_traffic, draw_sample
    use polydem_choose_instruction_set, only: choose_instruction_set
@@ -10,15 +10,17 @@ module polydem_start_simulation
    use polydem_communicator, only: communicator_t
    use polydem_domain, only: new_domain
    use polydem_enter_cell, only: check_constraint, enter_cell
-   use polydem_errors, only: error_t
+   use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: find_median
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_local_data, only: limit_displacement, rebuild_local_data
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
+   use polydem_source_locations, only: place_of
    use polydem_start_forces, only: start_forces
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: start_with_bodies, place_bodies
@@ -64,6 +66,8 @@ contains
       call draw_sample(self, sample, error)
       if (allocated(error)) return
       call self%bodies%pieces%allow(sample%pieces%most)
+      call check_identifiers(self, error)
+      if (allocated(error)) return
       call choose_step(self, sample, error)
       if (allocated(error)) return
       call self%body_forces%configure(self%settings%forces)
@@ -85,5 +89,29 @@ contains
       call redistribute(self, .false., error)
       call self%comm%all_reduce_error(error)
    end subroutine place_bodies
+
+   !> Check that the pieces of all bodies have identifiers, also once sources have made as many bodies as they count.
+   subroutine check_identifiers(self, error)
+      type(simulation_t), intent(in) :: self
+      !> Names the file of the bodies
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: origin
+      integer(ip) :: coming, k
+
+      coming = 0_ip
+      associate (settings => self%settings, last => self%bodies%last_id, most => self%bodies%pieces%most)
+         do k = 1_ip, size(settings%source, kind=ip)
+            coming = max(coming, settings%source(k)%count - self%bodies%n_all)
+         end do
+         if (most == 1_ip .and. coming == 0_ip) return
+         if (last <= greatest_identifier(most) - coming) return
+         origin = settings%file
+         if (settings%scene%bodies_file /= '') origin = place_of(settings, 'scene', 'bodies_file')
+         if (settings%scene%name == 'result') origin = place_of(settings, 'scene', 'start_from')
+         call raise(error, input_error, origin//': body '//to_text(last)//': with up to '//to_text(most)// &
+                    ' pieces of a body and '//to_text(coming)//' more bodies, identifiers must be at most '// &
+                    to_text(greatest_identifier(most) - coming)//'; number the bodies anew, from 1')
+      end associate
+   end subroutine check_identifiers
 
 end module polydem_start_simulation
