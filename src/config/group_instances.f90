@@ -11,8 +11,10 @@ module polydem_group_instances
    private
    public :: instance_t, new_instances, new_instance, store_value, row_of, index_of_instance, names_of, full_name
 
-   !> Greatest number of instances of a group. The check of their names compares all pairs
-   integer, parameter :: most_instances = 9999
+   !> Greatest number of instances of a group. Names and parts are compared in pairs
+   integer, parameter :: most_instances = 2000
+   !> Greatest number of materials, for each pair of which the stable time step is searched
+   integer, parameter :: most_materials = 500
 
    !> An instance of a group: what is given, and the resulting values
    type :: instance_t
@@ -49,7 +51,7 @@ contains
       !> A group has too many instances
       type(error_t), allocatable, intent(inout) :: error
       character(len=group_length), allocatable :: names(:)
-      integer :: counts(size(groups())), g, k, n
+      integer :: counts(size(groups())), g, k, most, n
 
       names = groups()
       opened = 0
@@ -61,8 +63,9 @@ contains
             if (is_repeatable(names(g)) .or. counts(g) == 0) counts(g) = counts(g) + 1
             opened(k) = n + counts(g)
          end do
-         if (counts(g) > most_instances) call raise(error, input_error, file//': there are '//to_text(counts(g))// &
-            ' groups &'//trim(names(g))//', but at most '//to_text(most_instances)//' are possible')
+         most = merge(most_materials, most_instances, names(g) == 'material')
+         if (counts(g) > most) call raise(error, input_error, file//': there are '//to_text(counts(g))// &
+            ' groups &'//trim(names(g))//', but at most '//to_text(most)//' are possible')
          if (.not. is_repeatable(names(g))) counts(g) = 1
          n = n + counts(g)
       end do

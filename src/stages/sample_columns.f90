@@ -1,6 +1,6 @@
 !> Columns of the series of a run for the whole sample, and lines of the log with some of them.
 module polydem_sample_columns
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
    use polydem_kinds, only: wp
    use polydem_named_values, only: named_values_t
    use polydem_quantities, only: coordination, flow, inertial_number, kinetic_energy, solid_fraction, stress, &
@@ -56,7 +56,7 @@ contains
 
          associate (number => real(row%value(index_of(name, row%name)), wp))
             value = '-'
-            if (abs(number) <= huge(1.0_wp)) value = to_text(number, 3)
+            if (ieee_is_finite(number)) value = to_text(number, 3)
          end associate
       end function value_of
 

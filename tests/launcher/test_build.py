@@ -208,7 +208,7 @@ class Build(Toy):
     def test_tests_are_chosen_by_label_and_counted_in_the_last_line(self):
         code, output, _ = self.call("test")
         self.assertNotEqual(code, 0)
-        self.assertEqual(output.splitlines()[-1], "2 passed, 1 failed, 1 skipped")
+        self.assertEqual(output.splitlines()[-1], "3 passed, 1 failed, 1 skipped")
         self.assertTrue(os.path.exists(os.path.join(self.folder, "build", "mpi", "src", "app", "polydem")))
         code, output, _ = self.call("test", "c.d")
         self.assertEqual((code, output.splitlines()[-1]), (0, "1 passed, 0 failed, 1 skipped"))
