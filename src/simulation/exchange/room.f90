@@ -34,6 +34,7 @@ contains
       real(wp), intent(in) :: point(2), reach
       !> Whether each body stays
       logical, intent(in) :: kept(:)
+      !> Centres and radii
       real(wp), allocatable, intent(out) :: near(:, :)
       real(wp) :: offset(2)
       integer(ip) :: k, n
