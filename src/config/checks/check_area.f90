@@ -31,8 +31,8 @@ contains
       end associate
    end subroutine check_area
 
-   !> Check that no rectangle in which bodies enter, leave or are counted is longer than the periodic cell: it would have
-   !> several copies of a body.
+   !> Check that no rectangle in which bodies enter, leave or are counted is longer than the periodic cell: it would
+   !> have several copies of a body.
    pure subroutine check_rectangles(settings, instances, error)
       !> Settings with all entries filled in
       type(settings_t), intent(in) :: settings

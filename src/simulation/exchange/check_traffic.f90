@@ -4,9 +4,9 @@ module polydem_check_traffic
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_exchange_bodies, only: meets_fixed, put_candidates
    use polydem_kinds, only: lp, wp
    use polydem_random, only: random_t
+   use polydem_room, only: meets_fixed, put_candidates
    use polydem_simulation, only: simulation_t
    use polydem_source, only: candidate_t, source_t
    use polydem_source_locations, only: place_of

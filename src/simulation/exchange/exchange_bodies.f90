@@ -3,12 +3,10 @@
 !> This is the first part of a step, so no checkpoint lies between it and the search for pairs that restores the contact
 !> history. Bodies leave first. All ranks draw the same candidates; each marks those that would meet a body of its own,
 !> and those that are left are compared with each other in the order in which they were drawn. All ranks decide alike.
-!>
-!> Bodies are compared by circles around them, fixed ones by their outlines.
 module polydem_exchange_bodies
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_cell, only: cell_t, copies_within, into_cell, nearest_copy, shear_flow
+   use polydem_cell, only: cell_t, copies_within, shear_flow
    use polydem_changed_bodies, only: count_entering, find_leaving_totals, n_totals, take_leaving
    use polydem_communicator, only: communicator_t
    use polydem_elementary, only: hypotenuse
@@ -19,6 +17,7 @@ module polydem_exchange_bodies
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_replace_bodies, only: replace_bodies
+   use polydem_room, only: list_near, meets_any, meets_fixed, put_candidates
    use polydem_simulation, only: simulation_t
    use polydem_sort, only: ascending_order, place_in
    use polydem_source, only: candidate_t, source_t
@@ -26,7 +25,7 @@ module polydem_exchange_bodies
    use polydem_wall_energy, only: release_energy
    implicit none
    private
-   public :: exchange_bodies, find_leaving, meets_fixed, put_candidates
+   public :: exchange_bodies, find_leaving
 
 contains
 
@@ -233,21 +232,6 @@ contains
       end do
    end subroutine list_entries
 
-   !> Put the places of candidates into the cell, if there is one.
-   pure subroutine put_candidates(bodies, candidates)
-      !> Bodies, of which the cell is used
-      type(bodies_t), intent(in) :: bodies
-      type(candidate_t), intent(inout) :: candidates(:)
-      integer :: j, k
-
-      if (.not. bodies%cell%is_periodic) return
-      do k = 1, size(candidates)
-         do j = 1, size(candidates(k)%place, 2)
-            candidates(k)%place(:, j) = into_cell(bodies%cell, candidates(k)%place(:, j))
-         end do
-      end do
-   end subroutine put_candidates
-
    !> Mark the places at which a candidate would meet a body of this rank.
    subroutine mark_blocked(self, source, candidates, kept, is_blocked)
       type(simulation_t), intent(in) :: self
@@ -275,99 +259,6 @@ contains
          end do
       end do
    end subroutine mark_blocked
-
-   !> List the circles around the free bodies near a point: centre and radius, (3, body) [m].
-   subroutine list_near(bodies, point, reach, kept, near)
-      type(bodies_t), intent(in) :: bodies
-      !> The point, and the distance to the farthest circle [m]
-      real(wp), intent(in) :: point(2), reach
-      !> Whether each body stays
-      logical, intent(in) :: kept(:)
-      real(wp), allocatable, intent(out) :: near(:, :)
-      real(wp) :: offset(2)
-      integer(ip) :: k, n
-
-      allocate (near(3, size(bodies%free)))
-      n = 0_ip
-      do k = 1_ip, size(bodies%free, kind=ip)
-         associate (s => bodies%free(k))
-            if (.not. kept(s)) cycle
-            offset = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, s) - point)
-            ! Copies above and below that slide may be nearer along x.
-            if (bodies%cell%is_sheared) offset(1) = 0.0_wp
-            if (hypotenuse(offset(1), offset(2)) >= reach + bodies%radius(s)) cycle
-            n = n + 1_ip
-            near(:, n) = [bodies%position(:, s), bodies%radius(s)]
-         end associate
-      end do
-      near = near(:, :n)
-   end subroutine list_near
-
-   !> Whether a circle meets one of others
-   pure logical function meets_any(bodies, centre, radius, circles)
-      !> Bodies, of which the cell is used
-      type(bodies_t), intent(in) :: bodies
-      !> Centre and radius [m]
-      real(wp), intent(in) :: centre(2), radius
-      !> Centres and radii of the others, (3, circle) [m]
-      real(wp), intent(in) :: circles(:, :)
-      real(wp) :: offset(2)
-      integer :: k
-
-      meets_any = .true.
-      do k = 1, size(circles, 2)
-         offset = nearest_copy(bodies%cell, bodies%cell%inverse, circles(1:2, k) - centre)
-         if (sum(offset**2) < (radius + circles(3, k))**2) return
-      end do
-      meets_any = .false.
-   end function meets_any
-
-   !> Whether a circle meets a fixed body that is there
-   pure logical function meets_fixed(bodies, centre, radius)
-      !> Bodies with the turned vertices of the fixed ones
-      type(bodies_t), intent(in) :: bodies
-      !> Centre and radius [m]
-      real(wp), intent(in) :: centre(2), radius
-      real(wp) :: offset(2), folds(2)
-      integer(ip) :: p, pieces(2), s
-
-      meets_fixed = .true.
-      do s = 1_ip, bodies%n
-         if (.not. bodies%fixed(s)) cycle
-         if (allocated(bodies%gone)) then
-            if (bodies%gone(s)) cycle
-         end if
-         offset = centre - bodies%position(:, s)
-         folds = 0.0_wp
-         if (allocated(bodies%folds)) folds = bodies%folds(:, s)
-         offset = nearest_copy(bodies%cell, folds, offset)
-         if (hypotenuse(offset(1), offset(2)) >= radius + bodies%radius(s)) cycle
-         pieces = bodies%pieces%pieces_of(s)
-         do p = pieces(1), pieces(2)
-            if (distance_from(bodies%pieces%turned_piece(p), offset) < radius) return
-         end do
-      end do
-      meets_fixed = .false.
-   end function meets_fixed
-
-   !> Greatest distance of a point from the lines of the edges of a convex polygon, outwards: at most its distance from
-   !> the polygon [m]
-   pure real(wp) function distance_from(polygon, point) result(distance)
-      !> Vertices, anticlockwise, (2, vertex) [m]
-      real(wp), intent(in) :: polygon(:, :)
-      !> The point [m]
-      real(wp), intent(in) :: point(2)
-      real(wp) :: edge(2), from(2)
-      integer :: k, n
-
-      distance = -huge(1.0_wp)
-      n = size(polygon, 2)
-      do k = 1, n
-         edge = polygon(:, mod(k, n) + 1) - polygon(:, k)
-         from = point - polygon(:, k)
-         distance = max(distance, (from(1)*edge(2) - from(2)*edge(1))/hypotenuse(edge(1), edge(2)))
-      end do
-   end function distance_from
 
    !> Append the candidates that find room, in the order in which they were drawn, up to the first one that does not.
    subroutine admit(self, source, candidates, is_blocked, circles, list, n_entered)

@@ -27,9 +27,9 @@ contains
    !> Put all bodies into the cell, if there is one, and check that it is large enough for them. Collective; all ranks
    !> get the same error.
    subroutine enter_cell(self, error)
-      !> The simulation with its settings, bodies and walls. On entry the cell of the bodies has nothing but displacement
-      !> and velocity of the copy above in the result from which the run starts; `n_outside` counts the bodies that were
-      !> outside the cell
+      !> The simulation with its settings, bodies and walls. On entry the cell of the bodies has nothing but
+      !> displacement and velocity of the copy above in the result from which the run starts; `n_outside` counts the
+      !> bodies that were outside the cell
       type(simulation_t), intent(inout) :: self
       !> Names a body that is too large for the cell
       type(error_t), allocatable, intent(inout) :: error
