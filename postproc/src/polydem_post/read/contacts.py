@@ -84,9 +84,9 @@ class Contacts:
 
     @property
     def area_gradient(self) -> FloatArray:
-        """Integral of the outward normal over the outline of first inside second, as was `normal` once [m], (m, 2).
+        """Length times normal: the integral of the outward normal over the outline of first inside second [m], (m, 2).
 
-        It is the gradient of the area when the first body moves, length times normal.
+        It is the gradient of the area when the first body moves. Files of layouts before 7 call it `normal`.
         """
         return self.length[:, None] * self.normal
 
