@@ -2,9 +2,9 @@
 module polydem_namelist_values
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_namelist_entries, only: entry_t, required
+   use polydem_namelist_entries, only: entries, entry_t, required
    use polydem_namelist_statements, only: literal_t, statement_t
-   use polydem_strings, only: to_text, counted, count_words, lower_case, quoted, split_words, suggestion, text_t
+   use polydem_strings, only: to_text, counted, count_words, join, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
    public :: value_t, read_value, value_text, label, is_text, list_text
@@ -85,6 +85,8 @@ contains
             statement%values(1)%text//', '//statement%values(1)%text
       else if (entry%count /= 1 .or. size(statement%values) /= 2 .or. entry%type /= 'real') then
          return
+      else if (statement%values(1)%is_repeated) then
+         text = '; a number is no expression: 2*x stands for x, x'
       else if (is_number(lower_case(statement%values(2)%text))) then
          text = '; a number has a decimal point, no comma'
       else
@@ -142,7 +144,7 @@ contains
       number = 0.0_wp
       text = lower_case(literal%text)
       if (literal%has_quotes .or. .not. (is_number(text) .or. is_not_finite(text))) then
-         problem = 'must be a real number, but '//literal%as_written()//' is given'
+         problem = 'must be a real number, but '//literal%as_written()//' is given'//no_expression(literal%text)
       else if (is_not_finite(text)) then
          problem = 'must be finite, but '//literal%text//' is given'
       else if (abs(magnitude(text)) > range(number)) then
@@ -228,7 +230,7 @@ contains
       number = 0_ip
       text = literal%text
       if (literal%has_quotes .or. .not. is_number(text) .or. scan(text, '.edED') > 0) then
-         problem = 'must be an integer, but '//literal%as_written()//' is given'
+         problem = 'must be an integer, but '//literal%as_written()//' is given'//no_expression(literal%text)
          return
       end if
       wide = huge(wide)
@@ -258,6 +260,32 @@ contains
       end if
       problem = 'must be .true. or .false., but '//literal%as_written()//' is given'
    end subroutine read_logical
+
+   !> Advice where an expression or a list in brackets stands in place of a number; otherwise empty
+   pure function no_expression(given) result(text)
+      character(len=*), intent(in) :: given
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (scan(given, '[](){}') > 0) then
+         text = '; numbers stand without brackets, with commas between them'
+      else if (verify(given, digits//'.+-*eEdD') == 0 .and. scan(given, digits) > 0 .and. scan(given, '*+-') > 0) then
+         text = '; a number is no expression: give its result'
+      end if
+   end function no_expression
+
+   !> Advice where a number stands in place of a word: the number whose key begins alike; empty if there is none
+   pure function number_beside(entry) result(text)
+      type(entry_t), intent(in) :: entry
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      do k = size(entries), 1, -1
+         if (entries(k)%group == entry%group .and. entries(k)%type == 'real' .and. &
+             index(entries(k)%key, trim(entry%key)//'_') == 1) text = '; its number is '//quoted(trim(entries(k)%key))
+      end do
+   end function number_beside
 
    !> Check a number against bounds such as '>= 0, < 1'.
    pure subroutine check_bounds(entry, literal, number, problem)
@@ -295,7 +323,10 @@ contains
       type(literal_t), intent(in) :: literal
       character(len=:), allocatable, intent(inout) :: problem
 
-      if (.not. literal%has_quotes) then
+      if (entry%type == 'word' .and. is_number(lower_case(literal%text))) then
+         problem = 'is one of the words '//join(split_words(entry%allowed), ', ')//', but '//literal%as_written()// &
+            ' is given'//number_beside(entry)
+      else if (.not. literal%has_quotes) then
          problem = 'must be in quotes: write '//quoted(literal%text)
       else if (entry%type /= 'word' .and. literal%text == '') then
          if (entry%default == required) problem = 'must not be empty'
