@@ -1,5 +1,6 @@
 !> Warnings about entries of the namelist that are probably a mistake: unusual values, what never happens, stresses that
-!> the stiffness does not bear, walls that are pulled away, materials that nothing has, and runs that take too many steps.
+!> the stiffness does not bear, walls that are pulled away, falls that nothing stops, sinks that bodies pass, materials
+!> that nothing has, and runs that take too many steps.
 module polydem_entry_warnings
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_run, longest_stage, number_of_stage
@@ -38,7 +39,11 @@ contains
          call warn_of_intervals(simulation, warnings)
       end if
       call warn_of_stresses(simulation, measures, warnings)
-      if (measures%free > 0_lp) call warn_of_pulls(simulation, measures, warnings)
+      if (measures%free > 0_lp) then
+         call warn_of_pulls(simulation, measures, warnings)
+         call warn_of_endless_fall(simulation, measures, warnings)
+      end if
+      call warn_of_sinks(simulation, warnings)
       call warn_of_rows(simulation%settings, warnings)
       call warn_of_copies(simulation%settings, warnings)
       if (allocated(measures%of_material)) call warn_of_materials(simulation%settings, measures%of_material, warnings)
@@ -229,33 +234,85 @@ contains
 
    end subroutine warn_of_stresses
 
-   !> Warn of loads that pull their walls away from all free bodies. Bodies of sources may be anywhere.
+   !> Warn of loads that pull their walls away from all free bodies. Bodies of sources may be anywhere, and a wall comes
+   !> back to them along an axis that repeats.
    subroutine warn_of_pulls(simulation, measures, warnings)
       type(simulation_t), intent(in) :: simulation
       type(scene_measures_t), intent(in) :: measures
       type(text_t), allocatable, intent(inout) :: warnings(:)
-      character(len=:), allocatable :: key
-      real(wp) :: extent(2), pull, slack
+      character(len=:), allocatable :: key, sense
+      real(wp) :: extent(2), pull, slack, free(2)
       integer :: k
 
       if (.not. allocated(simulation%walls%loads) .or. size(simulation%settings%source) > 0) return
-      slack = 0.5_wp*measures%diameter(2)
       do k = 1, size(simulation%walls%loads)
-         associate (load => simulation%walls%loads(k))
-            if (load%direction == along_angle) cycle
-            extent = simulation%walls%named%extent(load%wall, load%direction, simulation%bodies)
+         associate (load => simulation%walls%loads(k), given => simulation%settings%load(k), &
+                    cell => simulation%bodies%cell)
             pull = load%force + load%stress
-            if (.not. (pull > 0.0_wp .and. extent(1) > measures%free_extent(load%direction, 2) - slack) .and. &
-                .not. (pull < 0.0_wp .and. extent(2) < measures%free_extent(load%direction, 1) + slack)) cycle
+            if (load%direction == along_angle) then
+               if (cell%is_periodic .or. .not. measures%sides(3, k) > 0.0_wp) cycle
+               extent = 0.5_wp*measures%sides(3, k)*[-1.0_wp, 1.0_wp]
+               free = measures%sides(1:2, k)
+            else
+               if (cell%size(load%direction) > 0.0_wp) cycle
+               extent = simulation%walls%named%extent(load%wall, load%direction, simulation%bodies)
+               free = measures%free_extent(load%direction, :)
+            end if
+            ! Bodies reach into a row of grains, but not beyond the middle of the wall.
+            slack = 0.5_wp*min(extent(2) - extent(1), measures%diameter(2))
+            if (.not. (pull > 0.0_wp .and. extent(1) > free(2) - slack) .and. &
+                .not. (pull < 0.0_wp .and. extent(2) < free(1) + slack)) cycle
             key = 'force'
             if (abs(load%stress) > 0.0_wp) key = 'stress'
+            sense = 'acts along '//given%direction//', a negative one against it'
+            if (load%direction == along_angle) then
+               key = 'torque'
+               sense = 'turns anticlockwise, a negative one clockwise'
+            end if
             call add(warnings, place_of(simulation%settings, 'load.'//load%name, key)//': '''//key//''' in &load '// &
-                     load%name//' pulls the wall '//simulation%settings%load(k)%wall//' away from all free bodies. '// &
-                     'A positive value acts along '//simulation%settings%load(k)%direction// &
-                     ', a negative one against it; change the sign')
+                     load%name//' pulls the wall '//given%wall//' away from all free bodies. A positive value '// &
+                     sense//'; change the sign')
          end associate
       end do
    end subroutine warn_of_pulls
+
+   !> Warn of gravity along an axis that repeats, where nothing stops the fall.
+   subroutine warn_of_endless_fall(simulation, measures, warnings)
+      type(simulation_t), intent(in) :: simulation
+      type(scene_measures_t), intent(in) :: measures
+      type(text_t), allocatable, intent(inout) :: warnings(:)
+
+      associate (s => simulation%settings, cell => simulation%bodies%cell)
+         if (measures%fixed > 0_lp .or. .not. cell%is_periodic) return
+         if (s%forces%drag > 0.0_wp .or. abs(s%forces%turn_rate) > 0.0_wp) return
+         if (.not. any(abs(s%forces%gravity) > 0.0_wp .and. cell%size > 0.0_wp)) return
+         call add(warnings, place_of(s, 'forces', 'gravity')//': the cell repeats along gravity and has no walls, '// &
+                  'so nothing stops the fall of its bodies. Give gravity = 0, 0 in &forces, walls or drag')
+      end associate
+   end subroutine warn_of_endless_fall
+
+   !> Warn of sinks that bodies may pass between two times at which they may leave.
+   subroutine warn_of_sinks(simulation, warnings)
+      type(simulation_t), intent(in) :: simulation
+      type(text_t), allocatable, intent(inout) :: warnings(:)
+      real(wp) :: thickness, way
+      integer :: axis, k
+
+      do k = 1, size(simulation%settings%sink)
+         associate (sink => simulation%settings%sink(k), gravity => simulation%settings%forces%gravity)
+            axis = maxloc(abs(gravity), 1)
+            thickness = minval(sink%high - sink%low)
+            if (any(abs(gravity) > 0.0_wp)) thickness = sink%high(axis) - sink%low(axis)
+            way = simulation%expected%speed*real(sink%interval, wp)*simulation%dt
+            if (way <= thickness) cycle
+            call add(warnings, place_of(simulation%settings, 'sink.'//sink%name, 'interval')//': bodies of up to '// &
+                     to_text(simulation%expected%speed, 3)//' m/s ('//simulation%expected%origin//') move '// &
+                     to_text(way, 3)//' m in the '//to_text(sink%interval)//' steps between two times at which '// &
+                     'they may leave, but &sink '//sink%name//' is only '//to_text(thickness, 3)//' m '// &
+                     trim(merge('wide', 'high', axis == 1))//': they pass it. Enlarge it, or reduce ''interval''')
+         end associate
+      end do
+   end subroutine warn_of_sinks
 
    !> Warn of rows of fixed grains that leave a gap at the border of a periodic cell.
    subroutine warn_of_rows(settings, warnings)
