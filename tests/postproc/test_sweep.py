@@ -541,10 +541,13 @@ def test_collects_what_the_program_left(heights, capsys):
 
 
 def test_warnings_of_runs_are_reported_and_collected(tmp_path, capsys):
-    """Blocks as soft as a liquid sink into each other; the sweep says so, and its exit code stays 0."""
-    program, root = Path(os.environ["POLYDEM_PROGRAM"]), Path(os.environ["POLYDEM_SOURCE_DIR"])
-    made = make_sweep(root / "inputs" / "stack.nml", tmp_path / "sweep", program, None,
-                      ["forces.stiffness=1e7,200", "integrate.duration=0.2"])
+    """Two soft blocks that meet sink into each other; the sweep says so, and its exit code stays 0."""
+    program, base = Path(os.environ["POLYDEM_PROGRAM"]), tmp_path / "blocks.nml"
+    block = ("&grains name = '{}' region = 'at' at = {}, 0 shape = 'rectangle' width = 0.02 height = 0.02 "
+             "velocity = {}, 0 /")
+    base.write_text("\n".join([block.format("a", -0.02, 1), block.format("b", 0.02, -1), "&forces gravity = 0, 0 /",
+                               "&integrate duration = 0.04 dt = 1e-5 /\n"]), encoding="utf-8")
+    made = make_sweep(base, tmp_path / "sweep", program, None, ["forces.stiffness=1e7,1e4"])
     firm, soft = made.runs
     said = []
     assert Runner(program, 2, 1, say=said.append).run(made.runs) == 0

@@ -4,7 +4,7 @@
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse
-   use polydem_entry_warnings, only: add, warn_of_entries
+   use polydem_entry_warnings, only: warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
    use polydem_motion_check, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
@@ -15,6 +15,7 @@ module polydem_initial_warnings
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
+   use polydem_wall_warnings, only: add
    implicit none
    private
    public :: warn_of_risks
