@@ -206,24 +206,14 @@ contains
             bodies%diameter(s) = diameter(shape)
             if (bodies%pieces%most == 1_ip) bodies%thickness(s) = thickness(shape)
          end associate
-         if (bodies%pieces%most > 1_ip) bodies%thickness(s) = least_thickness(bodies%pieces, s)
+         if (bodies%pieces%most > 1_ip) then
+            associate (pieces => bodies%pieces)
+               bodies%thickness(s) = minval(pieces%thickness(pieces%first(s):pieces%first(s + 1_ip) - 1_ip))
+            end associate
+         end if
       end do
       !$omp end parallel do
    end subroutine measure_sizes
-
-   !> Least thickness of the pieces of a body, each about its centroid [m]
-   pure real(wp) function least_thickness(pieces, s) result(least)
-      type(pieces_t), intent(in) :: pieces
-      integer(ip), intent(in) :: s
-      integer(ip) :: p
-
-      least = huge(1.0_wp)
-      do p = pieces%first(s), pieces%first(s + 1_ip) - 1_ip
-         associate (shape => pieces%vertex(:, pieces%start(p):pieces%start(p + 1_ip) - 1_ip))
-            least = min(least, thickness(shape - spread(pieces%centre(:, p), 2, size(shape, 2))))
-         end associate
-      end do
-   end function least_thickness
 
    !> Update `turned` of up to `block_size` bodies to their angles; the caller turns their pieces, if they have several.
    !> A call for these in here costs a step 2 % of its instructions.

@@ -8,7 +8,7 @@
 !> `find_pieces` derives the rest. Pieces are numbered in the order of their bodies.
 module polydem_pieces
    use polydem_kinds, only: ip, wp
-   use polydem_polygon, only: greatest_radius, mass_properties, signed_area
+   use polydem_polygon, only: greatest_radius, mass_properties, signed_area, thickness_of => thickness
    implicit none
    private
    public :: pieces_t
@@ -35,6 +35,8 @@ module polydem_pieces
       real(wp), allocatable :: centre(:, :), arm(:, :)
       !> Greatest distance of a vertex of each piece from its centroid, (piece) [m]
       real(wp), allocatable :: radius(:)
+      !> Twice the least distance of an edge of each piece from its centroid, (piece) [m]
+      real(wp), allocatable :: thickness(:)
       !> Turned vertices relative to the centroid of their piece, (2, vertex) [m]
       real(wp), allocatable :: outline(:, :)
    contains
@@ -237,9 +239,10 @@ contains
             n = n + 1_ip + self%number(self%vertex_start(s + 1_ip) - 1_ip)
          end do
          if (allocated(self%first)) &
-            deallocate (self%first, self%body, self%start, self%centre, self%arm, self%radius, self%outline)
+            deallocate (self%first, self%body, self%start, self%centre, self%arm, self%radius, self%thickness, &
+                        self%outline)
          allocate (self%first(n_bodies + 1_ip), self%body(n), self%start(n + 1_ip), self%centre(2, n), self%arm(2, n), &
-                   self%radius(n), self%outline(2, n_vertices))
+                   self%radius(n), self%thickness(n), self%outline(2, n_vertices))
          p = 0_ip
          do s = 1_ip, n_bodies
             self%first(s) = p + 1_ip
@@ -259,6 +262,7 @@ contains
          associate (shape => self%vertex(:, self%start(p):self%start(p + 1_ip) - 1_ip))
             call mass_properties(shape, area, self%centre(:, p), second_moment)
             self%radius(p) = greatest_radius(shape - spread(self%centre(:, p), 2, size(shape, 2)))
+            self%thickness(p) = thickness_of(shape - spread(self%centre(:, p), 2, size(shape, 2)))
             self%outline(:, self%start(p):self%start(p + 1_ip) - 1_ip) = &
                shape - spread(self%centre(:, p), 2, size(shape, 2))
          end associate

@@ -6,7 +6,7 @@ module polydem_namelist_statements
    use polydem_errors, only: error_t, input_error, raise
    use polydem_namelist_tokens, only: source_t, token_t, split_tokens, &
       group_token, end_token, equals_token, comma_token, bare_token, quoted_token
-   use polydem_strings, only: lower_case, quoted
+   use polydem_strings, only: lower_case, quoted, to_text
    implicit none
    private
    public :: literal_t, statement_t, read_statements
@@ -17,6 +17,8 @@ module polydem_namelist_statements
       character(len=:), allocatable :: text
       !> Whether the value is in quotes
       logical :: has_quotes = .false.
+      !> Whether it is one of several that a repeat count makes, as in 3*0.5
+      logical :: is_repeated = .false.
    contains
       !> The value as written, for messages
       procedure :: as_written
@@ -37,6 +39,9 @@ module polydem_namelist_statements
       !> Whether the statement comes from the command line
       logical :: is_override = .false.
    end type statement_t
+
+   !> Greatest repeat count of a value
+   integer, parameter :: most_repeats = 10000
 
 contains
 
@@ -91,21 +96,25 @@ contains
       else if (next <= size(tokens)) then
          call raise(error, input_error, source%place(tokens(next)%line)//': '// &
             text_of(source, tokens(next))//' is outside a group; &name opens a group and / closes it'// &
-            hint_of_quotes(tokens(:next)))
+            hint_of_quotes(tokens(:next), scan(text_of(source, tokens(next)), '0123456789.') == 1))
       end if
    end subroutine read_statements
 
    !> Hint if the last token follows a value and a slash on one line, as in a path without quotes
-   pure function hint_of_quotes(tokens) result(hint)
+   pure function hint_of_quotes(tokens, is_number) result(hint)
       type(token_t), intent(in) :: tokens(:)
+      !> Whether the last token begins as a number
+      logical, intent(in) :: is_number
       character(len=:), allocatable :: hint
 
       hint = ''
       associate (n => size(tokens))
          if (n < 3) return
          if (any(tokens(n - 2:n)%line /= tokens(n)%line)) return
-         if (tokens(n - 2)%kind == bare_token .and. tokens(n - 1)%kind == end_token) &
-            hint = '; a value that contains / must be in quotes'
+         if (tokens(n - 2)%kind /= bare_token .or. tokens(n - 1)%kind /= end_token) return
+         hint = '; a value that contains / must be in quotes'
+         if (tokens(n - 2)%last + 2 == tokens(n)%first .and. is_number) hint = hint// &
+            ', and a number is no expression: give the result of a division'
       end associate
    end function hint_of_quotes
 
@@ -186,17 +195,26 @@ contains
       if (place <= size(tokens)) kind_at = tokens(place)%kind
    end function kind_at
 
-   !> Read values separated by a comma or blanks. A comma may follow the last value.
+   !> Read values separated by a comma or blanks. A comma may follow the last value. As in Fortran 2*0.5 is 0.5, 0.5.
    pure subroutine read_values(source, tokens, statement, error)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: tokens(:)
       type(statement_t), intent(inout) :: statement
       type(error_t), allocatable, intent(inout) :: error
+      type(literal_t) :: literal
+      type(token_t) :: token
       logical :: may_follow
-      integer :: k, n
+      integer :: j, k, n, repeats(size(tokens))
 
-      n = count(tokens%kind /= comma_token)
-      allocate (statement%values(n))
+      repeats = 0
+      do k = 1, size(tokens)
+         if (tokens(k)%kind /= comma_token) repeats(k) = repeats_of(text_of(source, tokens(k)))
+         if (repeats(k) <= most_repeats) cycle
+         call raise(error, input_error, statement%place//': '//text_of(source, tokens(k))// &
+                    ' repeats a value more than '//to_text(most_repeats)//' times')
+         return
+      end do
+      allocate (statement%values(sum(repeats)))
       n = 0
       may_follow = .false.
       do k = 1, size(tokens)
@@ -204,14 +222,43 @@ contains
             if (.not. may_follow) exit
             may_follow = .false.
          else
-            n = n + 1
-            call read_literal(source, tokens(k), statement%values(n))
+            token = tokens(k)
+            if (is_repeated(text_of(source, token))) token%first = token%first + index(text_of(source, token), '*')
+            call read_literal(source, token, literal)
+            literal%is_repeated = token%first > tokens(k)%first
+            do j = n + 1, n + repeats(k)
+               statement%values(j) = literal
+            end do
+            n = n + repeats(k)
             may_follow = .true.
          end if
       end do
       if (n == 0 .or. k <= size(tokens)) call raise(error, input_error, statement%place//': a value of '''// &
          statement%key//''' in &'//statement%group//' is missing')
    end subroutine read_values
+
+   !> Whether a token begins with a repeat count, as in 3*0.5
+   pure logical function is_repeated(text)
+      character(len=*), intent(in) :: text
+      integer :: star
+
+      star = verify(text, '0123456789')
+      is_repeated = .false.
+      if (star > 1 .and. star < len(text)) is_repeated = text(star:star) == '*' .and. text(star + 1:star + 1) /= '*'
+   end function is_repeated
+
+   !> Number of values that a token stands for; more than `most_repeats` if there are too many
+   pure integer function repeats_of(text) result(n)
+      character(len=*), intent(in) :: text
+      integer :: k
+
+      n = 1
+      if (.not. is_repeated(text)) return
+      n = 0
+      do k = 1, index(text, '*') - 1
+         n = min(10*n + index('0123456789', text(k:k)) - 1, most_repeats + 1)
+      end do
+   end function repeats_of
 
    !> Read one value and remove its quotes.
    pure subroutine read_literal(source, token, literal)

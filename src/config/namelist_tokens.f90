@@ -20,6 +20,9 @@ module polydem_namelist_tokens
    character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
    !> First two bytes of typographic quotes, single and double, in UTF-8
    character(len=*), parameter :: curly = char(226)//char(128)
+   !> Last byte of the dashes that begin alike, and the minus sign of typography
+   character(len=*), parameter :: last_of_dashes = char(144)//char(145)//char(146)//char(147)//char(148)//char(149)
+   character(len=*), parameter :: typographic_minus = char(226)//char(136)//char(146)
    !> Characters that end a token without quotes
    character(len=*), parameter :: separators = ' '//tab//line_feed//carriage_return//'=,/!&''"'
 
@@ -183,6 +186,11 @@ contains
          source%place(token%line)//': the sign between a key and its value is =, not :')
       if (allocated(error)) return
       do k = token%first, token%last
+         if (token%kind /= quoted_token .and. is_dash(source%text(k:min(k + 2, token%last)))) then
+            call raise(error, input_error, source%place(token%line)//': a minus sign is the plain -, not the '// &
+                       'dash or minus of typography that a text processor or a web page makes of it')
+            return
+         end if
          if (token%kind /= quoted_token .and. source%text(k:min(k + 1, token%last)) == curly) then
             call raise(error, input_error, source%place(token%line)//': a text is in straight quotes, '' or ", not '// &
                        'in typographic ones as a text processor makes them')
@@ -197,5 +205,14 @@ contains
          end if
       end do
    end subroutine refuse_characters
+
+   !> Whether three bytes are a dash or minus of typography
+   pure logical function is_dash(bytes)
+      character(len=*), intent(in) :: bytes
+
+      is_dash = .false.
+      if (len(bytes) < 3) return
+      is_dash = bytes == typographic_minus .or. (bytes(:2) == curly .and. scan(bytes(3:), last_of_dashes) > 0)
+   end function is_dash
 
 end module polydem_namelist_tokens

@@ -4,13 +4,12 @@ module polydem_namelist_values
    use polydem_kinds, only: ip, lp, wp
    use polydem_namelist_entries, only: entry_t, required
    use polydem_namelist_statements, only: literal_t, statement_t
-   use polydem_strings, only: to_text, counted, count_words, lower_case, quoted, split_words, suggestion, text_t
+   use polydem_strings, only: to_text, counted, count_words, join, lower_case, quoted, split_words, suggestion, text_t
+   use polydem_value_advice, only: advice, digits, is_number, no_expression, number_beside, text_at
    implicit none
    private
    public :: value_t, read_value, value_text, label, is_text, list_text
 
-   !> Decimal digits
-   character(len=*), parameter :: digits = '0123456789'
    !> Greatest number of characters of a name. The names of columns of the series begin with one
    integer, parameter :: longest_name = 64
    !> Characters of a name
@@ -75,26 +74,6 @@ contains
       end do
    end subroutine read_value
 
-   !> Advice for a number with a unit or with a decimal comma, which reads as two values; otherwise empty
-   pure function advice(entry, statement) result(text)
-      type(entry_t), intent(in) :: entry
-      type(statement_t), intent(in) :: statement
-      character(len=:), allocatable :: text
-
-      text = ''
-      if (index(entry%meaning, 'Smallest and largest') == 1 .and. size(statement%values) == 1) then
-         if (is_number(lower_case(statement%values(1)%text))) text = ', the smallest and the largest; write '// &
-            statement%values(1)%text//', '//statement%values(1)%text
-      else if (entry%count /= 1 .or. size(statement%values) /= 2 .or. entry%type /= 'real') then
-         return
-      else if (is_number(lower_case(statement%values(2)%text))) then
-         text = '; a number has a decimal point, no comma'
-      else
-         text = '; write the number alone'
-         if (entry%unit /= '' .and. entry%unit /= '1') text = text//', in '//trim(entry%unit)
-      end if
-   end function advice
-
    !> Name of an entry in messages
    pure function label(entry) result(text)
       type(entry_t), intent(in) :: entry
@@ -144,7 +123,7 @@ contains
       number = 0.0_wp
       text = lower_case(literal%text)
       if (literal%has_quotes .or. .not. (is_number(text) .or. is_not_finite(text))) then
-         problem = 'must be a real number, but '//literal%as_written()//' is given'
+         problem = 'must be a real number, but '//literal%as_written()//' is given'//no_expression(literal%text)
       else if (is_not_finite(text)) then
          problem = 'must be finite, but '//literal%text//' is given'
       else if (abs(magnitude(text)) > range(number)) then
@@ -162,48 +141,6 @@ contains
       first = 1 + merge(1, 0, scan(text_at(text, 1), '+-') > 0)
       is_not_finite = any(text(first:) == [character(len=8) :: 'nan', 'inf', 'infinity'])
    end function is_not_finite
-
-   !> Whether a text in lower case has the form [sign] digits [. digits] [e or d [sign] digits]. The digits on one side
-   !> of the point may be absent.
-   pure logical function is_number(text)
-      character(len=*), intent(in) :: text
-      integer :: k, n
-
-      k = 1
-      if (scan(text_at(text, 1), '+-') > 0) k = 2
-      n = run_of_digits(text(k:))
-      k = k + n
-      if (text_at(text, k) == '.') then
-         k = k + 1
-         n = n + run_of_digits(text(k:))
-         k = k + run_of_digits(text(k:))
-      end if
-      is_number = n > 0
-      if (scan(text_at(text, k), 'ed') > 0) then
-         k = k + 1
-         if (scan(text_at(text, k), '+-') > 0) k = k + 1
-         n = run_of_digits(text(k:))
-         is_number = is_number .and. n > 0 .and. n < 6
-         k = k + n
-      end if
-      is_number = is_number .and. k == len(text) + 1
-   end function is_number
-
-   !> Number of digits at the start of a text
-   pure integer function run_of_digits(text)
-      character(len=*), intent(in) :: text
-
-      run_of_digits = verify(text//'.', digits) - 1
-   end function run_of_digits
-
-   !> Character at a position; blank behind the end of the text
-   pure character(len=1) function text_at(text, place)
-      character(len=*), intent(in) :: text
-      integer, intent(in) :: place
-
-      text_at = ' '
-      if (place <= len(text)) text_at = text(place:place)
-   end function text_at
 
    !> Decimal exponent of the leading digit of a number; 0 for zero
    pure integer function magnitude(text)
@@ -230,7 +167,7 @@ contains
       number = 0_ip
       text = literal%text
       if (literal%has_quotes .or. .not. is_number(text) .or. scan(text, '.edED') > 0) then
-         problem = 'must be an integer, but '//literal%as_written()//' is given'
+         problem = 'must be an integer, but '//literal%as_written()//' is given'//no_expression(literal%text)
          return
       end if
       wide = huge(wide)
@@ -297,7 +234,10 @@ contains
       type(literal_t), intent(in) :: literal
       character(len=:), allocatable, intent(inout) :: problem
 
-      if (.not. literal%has_quotes) then
+      if (entry%type == 'word' .and. is_number(lower_case(literal%text))) then
+         problem = 'is one of the words '//join(split_words(entry%allowed), ', ')//', but '//literal%as_written()// &
+            ' is given'//number_beside(entry)
+      else if (.not. literal%has_quotes) then
          problem = 'must be in quotes: write '//quoted(literal%text)
       else if (entry%type /= 'word' .and. literal%text == '') then
          if (entry%default == required) problem = 'must not be empty'

@@ -26,14 +26,14 @@ module polydem_overlap_table
 contains
 
    !> Write a table of all contacts whose relative depth exceeds a limit. The root rank writes it. Collective.
-   subroutine write_overlap_table(path, bodies, contacts, thickness, limit, error, comm)
+   subroutine write_overlap_table(path, bodies, contacts, thinner, limit, error, comm)
       !> Path of the file
       character(len=*), intent(in) :: path
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
-      !> Limit of the depth as a fraction of the thickness of the thinner body
+      !> Thickness of the thinner piece of each contact, (contact) [m]
+      real(wp), intent(in) :: thinner(:)
+      !> Limit of the depth as a fraction of it
       real(wp), intent(in) :: limit
       !> Allocated on failure; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
@@ -43,7 +43,7 @@ contains
       integer(lp) :: most(1)
       integer(ip) :: low, n, rank
 
-      call collect_rows(bodies, contacts, thickness, limit, comm, block)
+      call collect_rows(bodies, contacts, thinner, limit, comm, block)
       if (comm%is_root()) call file%open(path, error)
       call comm%all_reduce_error(error)
       if (allocated(error)) return
@@ -64,10 +64,10 @@ contains
    end subroutine write_overlap_table
 
    !> Collect the rows of this rank: blocks of ranks are consecutive parts of the table. Collective.
-   subroutine collect_rows(bodies, contacts, thickness, limit, comm, block)
+   subroutine collect_rows(bodies, contacts, thinner, limit, comm, block)
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      real(wp), intent(in) :: thickness(:), limit
+      real(wp), intent(in) :: thinner(:), limit
       class(communicator_t), intent(inout) :: comm
       !> Identifiers, position, area, depth, and depth over thickness, (7, row)
       real(dp), allocatable, intent(out) :: block(:, :)
@@ -79,7 +79,7 @@ contains
 
       allocate (is_deep(contacts%n))
       do c = 1_ip, contacts%n
-         is_deep(c) = depth_share(contacts, thickness, c) > limit
+         is_deep(c) = depth_share(contacts, thinner, c) > limit
       end do
       allocate (deep(count(is_deep)), values(7, count(is_deep)))
       k = 0_ip
@@ -90,7 +90,7 @@ contains
          associate (i => contacts%first(c), j => contacts%second(c))
             values(:, k) = real([real(bodies%id(i), wp), real(bodies%id(j), wp), &
                                  bodies%position(:, i) + contacts%arm_first(:, c), contacts%area(c), &
-                                 contacts%area(c)/contacts%length(c), depth_share(contacts, thickness, c)], dp)
+                                 contacts%area(c)/contacts%length(c), depth_share(contacts, thinner, c)], dp)
          end associate
       end do
       call order_pairs(comm, bodies, contacts%first(deep), contacts%second(deep), rows)

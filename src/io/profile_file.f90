@@ -17,7 +17,7 @@ module polydem_profile_file
 contains
 
    !> Write profile.h5 into the folder of a result.
-   subroutine write_profile(folder, timers, seconds, counters, provenance, state_hash, status, error, memory)
+   subroutine write_profile(folder, timers, seconds, counters, provenance, state_hash, status, warnings, error, memory)
       !> Folder of the result
       character(len=*), intent(in) :: folder
       type(timers_t), intent(in) :: timers
@@ -30,6 +30,8 @@ contains
       integer(lp), intent(in) :: state_hash
       !> 'finished', or the reason why the run stopped
       character(len=*), intent(in) :: status
+      !> Numbers of warnings of each kind in words, empty without one
+      character(len=*), intent(in) :: warnings
       type(error_t), allocatable, intent(inout) :: error
       !> Resident memory after the last step [KiB]; not written if absent
       integer(lp), intent(in), optional :: memory
@@ -54,6 +56,7 @@ contains
       call file%write('/state_hash', hexadecimal(state_hash), error, '1', &
                       'hash of the bits of identifiers, positions, angles and velocities at the end')
       call file%write('/status', status, error, '1', 'how the run ended')
+      call file%write('/warnings', warnings, error, '1', 'numbers of warnings of each kind; empty without one')
       if (present(memory)) call file%write('/profile/memory', memory, error, 'KiB', 'resident after the last step')
       call complete_file(file, path, error)
    end subroutine write_profile

@@ -11,7 +11,7 @@ module polydem_finish
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
-   use polydem_monitor, only: report_pending_warnings, write_warning_counts
+   use polydem_monitor, only: report_pending_warnings, warnings_in_words, write_warning_counts
    use polydem_profile_file, only: write_profile
    use polydem_result_files, only: profile_name, series_name
    use polydem_run, only: run_t
@@ -19,6 +19,7 @@ module polydem_finish
    use polydem_series_csv, only: write_series_csv
    use polydem_simulation_counters, only: report_counters
    use polydem_time_step, only: tabulate_contacts
+   use polydem_strings, only: to_text
    use polydem_timers, only: n_stages
    implicit none
    private
@@ -58,7 +59,7 @@ contains
       type(error_t), allocatable :: write_error
       type(counters_t) :: counters
       character(len=:), allocatable :: status
-      integer(lp) :: hash, memory
+      integer(lp) :: hash, memory, at_end
 
       memory = resident_memory()
       status = 'finished'
@@ -75,14 +76,17 @@ contains
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)
+         at_end = run%log%warnings
          if (s%settings%output%energy_balance) call write_energy_report(s, run%log)
          if (.not. allocated(error)) call write_end_warnings(s, run%log)
+         at_end = run%log%warnings - at_end
          call write_warning_counts(run%monitor, run%log)
+         if (at_end > 0_lp) call run%log%write_line('warnings: '//to_text(at_end)//' at the end')
          if (allocated(error)) call run%log%write_line('stopped: '//status)
          call write_hash(run%log, hexadecimal(hash))
          ! The profile comes last: a result with a profile has the whole log.
          if (run%comm%is_root()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
-                                                  status, write_error, memory)
+                                                  status, warnings_in_words(run%monitor, at_end), write_error, memory)
          call run%manifest%close_file(run%folder//'/'//profile_name, write_error)
       end associate
       call run%log%close(write_error)

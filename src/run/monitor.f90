@@ -6,12 +6,12 @@ module polydem_monitor
    use polydem_log, only: log_t
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text
+   use polydem_strings, only: counted, to_text
    use polydem_warning, only: warning_t
    implicit none
    private
    public :: monitor_t, new_monitor, check_step, needs_contacts, asks_all, report_pending_warnings, &
-      write_warning_counts, serialize_monitor, warning_counts, set_warning_counts, most_guards
+      write_warning_counts, warnings_in_words, serialize_monitor, warning_counts, set_warning_counts, most_guards
 
    !> Greatest number of guards
    integer, parameter :: most_guards = 16
@@ -186,6 +186,27 @@ contains
          monitor%list(k)%guard%warning%count = counts(k)
       end do
    end subroutine set_warning_counts
+
+   !> Numbers of warnings of each kind, as in '2 about the initial state; 30 steps with a contact that was too deep';
+   !> empty without one
+   function warnings_in_words(monitor, at_end) result(text)
+      type(monitor_t), intent(in) :: monitor
+      !> Number of warnings at the end of the run
+      integer(lp), intent(in) :: at_end
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      if (monitor%at_start > 0_lp) text = text//'; '//to_text(monitor%at_start)//' about the initial state'
+      do k = 1, size(monitor%list)
+         associate (guard => monitor%list(k)%guard)
+            if (guard%warning%count > 0_lp) text = text//'; '//counted(guard%warning%count, guard%noun)//' '// &
+               guard%finding
+         end associate
+      end do
+      if (at_end > 0_lp) text = text//'; '//to_text(at_end)//' at the end'
+      text = text(min(len(text), 2) + 1:)
+   end function warnings_in_words
 
    !> Write what each guard has found.
    subroutine write_warning_counts(monitor, log)

@@ -24,12 +24,12 @@ module polydem_contact_flags
    public :: flag_limits_t, new_flag_limits, test_block, passing_text, packed_direction, is_reversed, &
       centre_inside, least_depth
 
-   !> Minimum depth of the tested contacts, as a fraction of the thickness of the thinner body
+   !> Minimum depth of the tested contacts, as a fraction of the thickness of the thinner piece
    real(wp), parameter :: least_depth = 0.0625_wp
 
    !> Limits beyond which contacts are flagged
    type :: flag_limits_t
-      !> Contacts deeper than this fraction of the thickness of the thinner body are flagged; huge: only degenerate
+      !> Contacts deeper than this fraction of the thickness of the thinner piece are flagged; huge: only degenerate
       !> ones
       real(wp) :: least_depth = huge(1.0_wp)
       !> Contacts that are not deeper than this are surely none [m]
@@ -116,10 +116,22 @@ contains
          suspect(c) = block%degenerate(c) > 0.0_wp &
             .or. block%length(c)*block%inverse_length(c)*block%mobility(c) > limits%soft
          if (suspect(c) .or. limits%least_depth >= huge(1.0_wp)) cycle
-         suspect(c) = block%area(c) > limits%least_depth*block%length(c) &
-            *min(bodies%thickness(block%first(c)), bodies%thickness(block%second(c)))
+         suspect(c) = block%area(c) > limits%least_depth*block%length(c)*thinner_of(bodies, block, c)
       end do
    end subroutine find_suspects
+
+   !> Thickness of the thinner of the two pieces of a contact [m]
+   pure real(wp) function thinner_of(bodies, block, c)
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      integer(ip), intent(in) :: c
+
+      if (bodies%pieces%most == 1_ip) then
+         thinner_of = min(bodies%thickness(block%first(c)), bodies%thickness(block%second(c)))
+      else
+         thinner_of = min(bodies%pieces%thickness(block%piece(c, 1)), bodies%pieces%thickness(block%piece(c, 2)))
+      end if
+   end function thinner_of
 
    !> Whether the bodies of a contact pass through each other
    pure logical function passes(bodies, block, c, reversed)
@@ -130,7 +142,7 @@ contains
       logical, intent(in) :: reversed
 
       associate (i => block%first(c), j => block%second(c))
-         passes = block%area(c) > least_depth*block%length(c)*min(bodies%thickness(i), bodies%thickness(j))
+         passes = block%area(c) > least_depth*block%length(c)*thinner_of(bodies, block, c)
          if (.not. passes .or. reversed) return
          if (bodies%pieces%most > 1_ip) then
             passes = piece_inside(bodies, i, j, block%piece(c, 1), block%piece(c, 2)) &

@@ -108,7 +108,7 @@ contains
       timers%most(1:2) = [0.5_dp, 0.25_dp]
       call counters%set('pairs', 5000000000_lp)
       call counters%set('contacts', 12_lp)
-      call write_profile(folder, timers, 2.0_dp, counters, provenance, 81985529216486895_lp, 'finished', error)
+      call write_profile(folder, timers, 2.0_dp, counters, provenance, 81985529216486895_lp, 'finished', '', error)
    end subroutine write_sample_profile
 
 end module sample

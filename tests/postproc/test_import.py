@@ -313,7 +313,10 @@ def features(*properties):
     ("a.txt", "0 0\n1 1\n1 0\n0 1\n", "a.txt:1: the outline cannot be a body"),
     ("a.txt", text([STAR[k] for k in (0, 4, 8, 2, 6)]), "its edges 1 and 3 cross"),
     ("a.txt", "0 0\n1 0\n1 1e999\n", "a coordinate is not a finite number"),
-    ("a.dxf", "0 0", "its name does not say the format; give --from wkt, geojson, text"),
+    ("a.xyz", "0 0", "its name does not say the format; give --from wkt, geojson, text"),
+    ("a.dxf", "0 0", "import reads polygons, wkt, geojson, text, but this is a drawing; convert it to WKT or GeoJSON"),
+    ("a.PNG", "0 0", "but this is a picture; trace its outlines (find_contours of scikit-image) and write"),
+    ("a.stl", "0 0", "but this is a body in space; cut it"),
 ])
 def test_errors_name_the_place(tmp_path, capsys, name, content, message):
     (tmp_path / name).write_text(content)

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import platform
+import re
 import signal
 import subprocess
 import sys
@@ -540,6 +541,33 @@ def test_collects_what_the_program_left(heights, capsys):
         assert str(file["exit_code"][3]) == "nan"
 
 
+def test_warnings_of_runs_are_reported_and_collected(tmp_path, capsys):
+    """Two soft blocks that meet sink into each other; the sweep says so, and its exit code stays 0."""
+    program, base = Path(os.environ["POLYDEM_PROGRAM"]), tmp_path / "blocks.nml"
+    block = ("&grains name = '{}' region = 'at' at = {}, 0 shape = 'rectangle' width = 0.02 height = 0.02 "
+             "velocity = {}, 0 /")
+    base.write_text("\n".join([block.format("a", -0.02, 1), block.format("b", 0.02, -1), "&forces gravity = 0, 0 /",
+                               "&integrate duration = 0.04 dt = 1e-5 /\n"]), encoding="utf-8")
+    made = make_sweep(base, tmp_path / "sweep", program, None, ["forces.stiffness=1e7,1e4"])
+    firm, soft = made.runs
+    said = []
+    assert Runner(program, 2, 1, say=said.append).run(made.runs) == 0
+    (line,) = [line for line in said if line.startswith(f"{soft.name}: finished")]
+    assert re.search(r" with warnings: .*[1-9]\d* steps with a contact that was too deep", line), said
+    assert not any("warnings" in line for line in said if line.startswith(f"{firm.name}: finished")), said
+    assert said[-1].startswith("1 of 2 runs have warnings") and said[-1].endswith(f": {soft.name}"), said
+    assert main(["sweep", "collect", str(made.folder)]) == 0
+    assert said[-1] in capsys.readouterr().out.splitlines()
+    with (made.folder / "results.csv").open(newline="", encoding="utf-8") as file:
+        rows = {row["name"]: row for row in csv.DictReader(file)}
+    assert rows[firm.name]["warnings"] == "" and "a contact that was too deep" in rows[soft.name]["warnings"]
+    log = (soft.result / "log.txt").read_text(encoding="utf-8")
+    counts = re.findall(r"^warnings: (.*)$", log, re.MULTILINE)
+    assert rows[soft.name]["warnings"] == "; ".join(counts), (rows[soft.name], counts)
+    with h5py.File(made.folder / "results.h5", "r") as file:
+        assert list(file["warnings"].asstr()) == ["", rows[soft.name]["warnings"]]
+
+
 def test_collect_tells_of_a_seed_without_effect(tmp_path, capsys):
     """Finds runs that pass for independent ones, and a warning about runs that differ, or only in their finder."""
     program = Path(os.environ["POLYDEM_PROGRAM"])
@@ -558,6 +586,24 @@ def test_collect_tells_of_a_seed_without_effect(tmp_path, capsys):
     assert same_states(few) == []
     assert same_states([few[0], few[0]])[0].endswith("hash: their entries are the same; error bars must count them as "
                                                      "one run")
+
+
+@pytest.mark.parametrize(("words", "parts"), [
+    (["forces.gravity=0,-9.81"], ["takes 2 values, but 1 value is given", "semicolons if they have commas"]),
+    (["forces.friction_coefficient=[0.1,0.2]"], ["values stand without brackets, as in"]),
+    (["forces.gravity=(0,-9.81),(0,-1)"], ["values stand without brackets", "'forces.gravity=0,-9.81;0,-1'"]),
+    (["forces.friction_coefficient=0.1:0.5:0.1"], ["is no range; write the values out, as in"]),
+    (["list.csv"], ["list.csv:2: ", "takes 1 value, but 2 values are given", "lists of values stand behind"]),
+])
+def test_a_list_that_was_meant_otherwise_is_explained(words, parts, tmp_path, monkeypatch, capsys):
+    program, root = os.environ["POLYDEM_PROGRAM"], Path(os.environ["POLYDEM_SOURCE_DIR"])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "list.csv").write_text('name,forces.friction_coefficient\na,"0.1,0.2"\n', encoding="utf-8")
+    base = str(root / "inputs" / "stack.nml")
+    assert main(["sweep", "--program", program, "make", base, *words, "--output", "o"]) == 2
+    said = capsys.readouterr().err
+    assert all(part in said for part in parts), said
+    assert not (tmp_path / "o").exists()
 
 
 def test_the_program_finds_the_wrong_entry(tmp_path, capsys):

@@ -17,6 +17,14 @@ from .base.result_file import ResultError, cannot_read
 #: Properties of a body that GeoJSON may give, besides its outline
 PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id", "material")
 
+#: Files that are no polygons, by the end of their name: what they are, and what makes polygons of them
+_DRAWING = "a drawing; convert it to WKT or GeoJSON (ogr2ogr, QGIS)"
+_PICTURE = "a picture; trace its outlines (find_contours of scikit-image) and write their vertices as text"
+_SOLID = "a body in space; cut it, and write the vertices of the cut as text"
+OTHER_FORMATS = {**dict.fromkeys((".dxf", ".dwg", ".svg", ".shp", ".kml", ".gpkg"), _DRAWING),
+                 **dict.fromkeys((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif", ".pdf"), _PICTURE),
+                 **dict.fromkeys((".stl", ".obj", ".ply", ".step", ".stp", ".iges"), _SOLID)}
+
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RING = re.compile(r"\(([^()]*)\)")
 
@@ -37,6 +45,9 @@ class Outline:
 def read_outlines(path: Path, form: str = "") -> list[Outline]:
     """All outlines of a file; the format follows from the end of its name unless it is given."""
     form = form or FORMAT_OF_SUFFIX.get(path.suffix.lower(), "")
+    if not form and path.suffix.lower() in OTHER_FORMATS:
+        raise ResultError(f"{path}: import reads polygons, {', '.join(READERS)}, but this is "
+                          f"{OTHER_FORMATS[path.suffix.lower()]}")
     if form not in READERS:
         raise ResultError(f"{path}: its name does not say the format; give --from "
                           f"{', '.join(READERS)}")

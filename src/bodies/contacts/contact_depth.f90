@@ -1,7 +1,8 @@
 !> Depth of contacts relative to the size of their bodies.
 !>
 !> The depth of a contact is its area over its length, which is the mean depth of the overlap. Its share is the depth
-!> over the thickness of the thinner body. A share of about 0.5 means that one body is passing through the other.
+!> over the thickness of the thinner of the two pieces that touch; a convex body is one piece. A share of about 0.5
+!> means that one body is passing through the other.
 module polydem_contact_depth
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
@@ -9,34 +10,53 @@ module polydem_contact_depth
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: depth_share, deepest_contact, any_deeper, depth_text
+   public :: thinner_pieces, depth_share, deepest_contact, any_deeper, depth_text
 
 contains
 
-   !> Depth of a contact as a share of the thinner body
-   pure real(wp) function depth_share(contacts, thickness, c)
+   !> Thickness of the thinner of the two pieces of each contact, (contact) [m]
+   pure function thinner_pieces(bodies, contacts, first, second) result(thinner)
+      type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
+      !> Lower and higher piece of each pair of the list in which the contacts were found
+      integer(ip), intent(in) :: first(:), second(:)
+      real(wp) :: thinner(contacts%n)
+      integer(ip) :: c
+
+      do c = 1_ip, contacts%n
+         if (bodies%pieces%most == 1_ip) then
+            thinner(c) = min(bodies%thickness(contacts%first(c)), bodies%thickness(contacts%second(c)))
+         else
+            associate (pair => contacts%pair(c), thickness => bodies%pieces%thickness)
+               thinner(c) = min(thickness(first(pair)), thickness(second(pair)))
+            end associate
+         end if
+      end do
+   end function thinner_pieces
+
+   !> Depth of a contact as a share of the thinner piece
+   pure real(wp) function depth_share(contacts, thinner, c)
+      type(contacts_t), intent(in) :: contacts
+      !> Thickness of the thinner piece of each contact, (contact) [m]
+      real(wp), intent(in) :: thinner(:)
       !> Index of the contact
       integer(ip), intent(in) :: c
 
-      depth_share = contacts%area(c)/(contacts%length(c)*min(thickness(contacts%first(c)), &
-                                                             thickness(contacts%second(c))))
+      depth_share = contacts%area(c)/(contacts%length(c)*thinner(c))
    end function depth_share
 
    !> The contact with the greatest share, 0 if there are no contacts
-   pure integer(ip) function deepest_contact(contacts, thickness)
+   pure integer(ip) function deepest_contact(contacts, thinner)
       type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
+      !> Thickness of the thinner piece of each contact, (contact) [m]
+      real(wp), intent(in) :: thinner(:)
       real(wp) :: share, greatest
       integer(ip) :: c
 
       deepest_contact = 0_ip
       greatest = -1.0_wp
       do c = 1_ip, contacts%n
-         share = depth_share(contacts, thickness, c)
+         share = depth_share(contacts, thinner, c)
          if (share > greatest) then
             greatest = share
             deepest_contact = c
@@ -44,33 +64,32 @@ contains
       end do
    end function deepest_contact
 
-   !> Whether any contact is deeper than a share of the thinner body
-   logical function any_deeper(contacts, thickness, limit)
+   !> Whether any contact is deeper than a share of the thinner piece
+   logical function any_deeper(contacts, thinner, limit)
       type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
-      !> Share of the thinner body
+      !> Thickness of the thinner piece of each contact, (contact) [m]
+      real(wp), intent(in) :: thinner(:)
+      !> Share of the thinner piece
       real(wp), intent(in) :: limit
       integer(ip) :: c
       logical :: deeper
 
       deeper = .false.
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(contacts, thickness, limit) private(c) reduction(.or.:deeper)
+      !$omp    shared(contacts, thinner, limit) private(c) reduction(.or.:deeper)
       do c = 1_ip, contacts%n
-         deeper = deeper .or. contacts%area(c) > limit*contacts%length(c) &
-            *min(thickness(contacts%first(c)), thickness(contacts%second(c)))
+         deeper = deeper .or. contacts%area(c) > limit*contacts%length(c)*thinner(c)
       end do
       !$omp end parallel do
       any_deeper = deeper
    end function any_deeper
 
    !> Clause for a message: bodies, position and depth of a contact
-   function depth_text(bodies, contacts, thickness, c) result(text)
+   function depth_text(bodies, contacts, thinner, c) result(text)
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
+      !> Thickness of the thinner piece of each contact, (contact) [m]
+      real(wp), intent(in) :: thinner(:)
       !> Index of the contact
       integer(ip), intent(in) :: c
       character(len=:), allocatable :: text
@@ -80,7 +99,7 @@ contains
             to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
             to_text(bodies%position(2, i) + contacts%arm_first(2, c))//') m overlap by '// &
             to_text(contacts%area(c)/contacts%length(c), 3)//' m, '// &
-            to_text(depth_share(contacts, thickness, c), 3)//' of the thinner body'
+            to_text(depth_share(contacts, thinner, c), 3)//' of the thinner body'
       end associate
    end function depth_text
 

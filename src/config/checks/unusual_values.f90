@@ -1,5 +1,5 @@
-!> Values that are allowed, but hardly meant: numbers in another unit, and angles in radian. The table of entries has the
-!> usual range beside each entry.
+!> Values that are allowed, but hardly meant: numbers in another unit, and angles in radian. The table of entries has
+!> the usual range of each entry.
 module polydem_unusual_values
    use polydem_group_instances, only: instance_t
    use polydem_kinds, only: wp
@@ -19,6 +19,7 @@ contains
    pure subroutine list_unusual(instances, warnings)
       !> Instances of all groups with their values
       type(instance_t), intent(in) :: instances(:)
+      !> The warnings
       type(text_t), allocatable, intent(out) :: warnings(:)
       integer :: i, k, row
 
@@ -45,6 +46,7 @@ contains
       type(entry_t), intent(in) :: entry
       !> Number of the value among those of the entry
       integer, intent(in) :: k
+      !> The value
       real(wp), intent(in) :: value
       character(len=len(entry%usual)), allocatable :: words(:)
       real(wp) :: bound

@@ -1,5 +1,6 @@
 !> Description of a run: its scene, models and time step, for `check` and for the head of the log.
 module polydem_description
+   use polydem_contact_depth, only: thinner_pieces
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
@@ -178,8 +179,11 @@ contains
          if (folder == '') then
             call log%write_line('           (a run lists them in overlaps.csv)')
          else
-            call write_overlap_table(folder//'/'//overlaps_name, s%bodies, s%contacts, s%bodies%thickness, &
-                                     limit, error, s%comm)
+            associate (pairs => s%search%neighbours%pairs)
+               call write_overlap_table(folder//'/'//overlaps_name, s%bodies, s%contacts, &
+                                        thinner_pieces(s%bodies, s%contacts, pairs%first, pairs%second), limit, &
+                                        error, s%comm)
+            end associate
             call log%write_line('           full list: '//folder//'/'//overlaps_name)
          end if
       end associate

@@ -6,6 +6,7 @@ module polydem_end_warnings
    use polydem_simulation, only: simulation_t
    use polydem_source, only: source_t
    use polydem_strings, only: to_text
+   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: write_end_warnings, warn_of_end
@@ -28,7 +29,10 @@ contains
                                                     simulation%step - stages%first(stages%number), log)
       end associate
       if (allocated(simulation%bodies%cell%load)) call warn_of_cell(simulation, log)
-      if (allocated(simulation%walls%loads)) call warn_of_loads(simulation, log)
+      if (allocated(simulation%walls%loads)) then
+         call warn_of_loads(simulation, log)
+         call warn_of_passing_walls(simulation, log)
+      end if
       if (.not. allocated(simulation%traffic)) return
       do k = 1, size(simulation%traffic%sources)
          call warn_of_source(simulation, simulation%traffic%sources(k), log)
@@ -92,30 +96,72 @@ contains
       end do
    end subroutine warn_of_loads
 
-   !> Warn of a source from which no body, or fewer than the rate asks for, have entered.
+   !> Warn of two walls with loads along one axis that were apart at the start and overlap now, or have changed places:
+   !> fixed bodies do not push each other.
+   subroutine warn_of_passing_walls(simulation, log)
+      type(simulation_t), intent(in) :: simulation
+      type(log_t), intent(inout) :: log
+      !> Least and greatest coordinates, (bound, wall, axis), and those along the axis of the loads at the start [m]
+      real(wp) :: extents(2, 2, 2), start(2, 2)
+      integer :: axis, i, j, k, lower, upper
+
+      associate (loads => simulation%walls%loads, named => simulation%walls%named, bodies => simulation%bodies)
+         do k = 2, size(loads)
+            do j = 1, k - 1
+               axis = loads(j)%direction
+               if (axis == along_angle .or. loads(k)%direction /= axis .or. loads(j)%wall == loads(k)%wall) cycle
+               if (bodies%cell%size(axis) > 0.0_wp) cycle
+               do i = 1, 2
+                  extents(:, 1, i) = named%extent(loads(j)%wall, i, bodies)
+                  extents(:, 2, i) = named%extent(loads(k)%wall, i, bodies)
+               end do
+               associate (across => extents(:, :, 3 - axis), along => extents(:, :, axis))
+                  if (maxval(across(1, :)) >= minval(across(2, :))) cycle
+                  start = along - spread([loads(j)%place, loads(k)%place], 1, 2)
+                  lower = minloc(start(1, :), 1)
+                  upper = 3 - lower
+                  if (start(2, lower) > start(1, upper) .or. along(2, lower) <= along(1, upper)) cycle
+               end associate
+               call log%write_line('warning: the walls of &load '//loads(j)%name//' and &load '//loads(k)%name// &
+                  ' have passed into or through each other: fixed bodies do not push each other. Loads need bodies '// &
+                  'between their walls that bear them, or an ''end''')
+            end do
+         end do
+      end associate
+   end subroutine warn_of_passing_walls
+
+   !> Warn of a source from which no body, or fewer than the rate asks for, have entered, and of one that does not fill
+   !> the run up to its count.
    subroutine warn_of_source(simulation, source, log)
       type(simulation_t), intent(in) :: simulation
       type(source_t), intent(in) :: source
       type(log_t), intent(inout) :: log
       character(len=:), allocatable :: text
-      integer(lp) :: due, first
+      integer(lp) :: due, first, there
 
       associate (s => simulation, given => source%settings)
          if (source%stage > 0_ip .and. source%stage /= s%stages%number) return
          first = 0_lp
          if (source%stage > 0_ip) first = s%stages%first(source%stage)
-         due = 1_lp
-         if (given%count == 0) due = source%due(s%step, first, s%dt)
-         if (real(due - source%entered, wp) <= noticed*real(due, wp)) return
-         text = 'warning: '//to_text(source%entered)//' bodies have entered from &source '//given%name
-         if (given%count == 0) text = text//', of '//to_text(due)//' that its rate asks for'
+         if (given%count == 0_ip) then
+            due = source%due(s%step, first, s%dt)
+            there = source%entered
+            text = to_text(there)//' bodies have entered from &source '//given%name//', of '//to_text(due)// &
+               ' that its rate asks for'
+         else
+            due = int(given%count, lp)
+            there = int(s%bodies%n_all - count(s%bodies%fixed, kind=ip), lp)
+            text = to_text(there)//' free bodies are there at the end, of '//to_text(due)//' up to which &source '// &
+               given%name//' fills the run; '//to_text(source%entered)//' have entered'
+         end if
+         if (real(due - there, wp) <= noticed*real(due, wp)) return
          if (source%blocked > 0_lp) then
             text = text//': they found no room '//to_text(source%blocked)//' times. Give it a larger or freer '// &
-               'rectangle, a greater velocity, or a lower rate'
+               'rectangle, a greater velocity, or a lower '//trim(merge('count', 'rate ', given%count > 0_ip))
          else
             text = text//'. They enter every '//to_text(given%interval)//' steps: reduce interval'
          end if
-         call log%write_line(text)
+         call log%write_line('warning: '//text)
       end associate
    end subroutine warn_of_source
 

@@ -1,5 +1,6 @@
 !> Warnings about entries of the namelist that are probably a mistake: unusual values, what never happens, stresses that
-!> the stiffness does not bear, walls that are pulled away, materials that nothing has, and runs that take too many steps.
+!> the stiffness does not bear, walls that are pulled away, falls that nothing stops, sinks that bodies pass, materials
+!> that nothing has, and runs that take too many steps.
 module polydem_entry_warnings
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_run, longest_stage, number_of_stage
@@ -8,10 +9,10 @@ module polydem_entry_warnings
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: text_t, to_text
-   use polydem_wall_load, only: along_angle
+   use polydem_wall_warnings, only: add, warn_of_copies, warn_of_pulls, warn_of_rows
    implicit none
    private
-   public :: add, warn_of_entries
+   public :: warn_of_entries
 
    !> Relative length of rounding errors
    real(wp), parameter :: rounding = 1.0e-9_wp
@@ -38,7 +39,11 @@ contains
          call warn_of_intervals(simulation, warnings)
       end if
       call warn_of_stresses(simulation, measures, warnings)
-      if (measures%free > 0_lp) call warn_of_pulls(simulation, measures, warnings)
+      if (measures%free > 0_lp) then
+         call warn_of_pulls(simulation, measures, warnings)
+         call warn_of_endless_fall(simulation, measures, warnings)
+      end if
+      call warn_of_sinks(simulation, warnings)
       call warn_of_rows(simulation%settings, warnings)
       call warn_of_copies(simulation%settings, warnings)
       if (allocated(measures%of_material)) call warn_of_materials(simulation%settings, measures%of_material, warnings)
@@ -229,89 +234,43 @@ contains
 
    end subroutine warn_of_stresses
 
-   !> Warn of loads that pull their walls away from all free bodies. Bodies of sources may be anywhere.
-   subroutine warn_of_pulls(simulation, measures, warnings)
+   !> Warn of gravity along an axis that repeats, where nothing stops the fall.
+   subroutine warn_of_endless_fall(simulation, measures, warnings)
       type(simulation_t), intent(in) :: simulation
       type(scene_measures_t), intent(in) :: measures
       type(text_t), allocatable, intent(inout) :: warnings(:)
-      character(len=:), allocatable :: key
-      real(wp) :: extent(2), pull, slack
-      integer :: k
 
-      if (.not. allocated(simulation%walls%loads) .or. size(simulation%settings%source) > 0) return
-      slack = 0.5_wp*measures%diameter(2)
-      do k = 1, size(simulation%walls%loads)
-         associate (load => simulation%walls%loads(k))
-            if (load%direction == along_angle .or. load%has_weight) cycle
-            extent = simulation%walls%named%extent(load%wall, load%direction, simulation%bodies)
-            pull = load%force + load%stress
-            if (.not. (pull > 0.0_wp .and. extent(1) > measures%free_extent(load%direction, 2) - slack) .and. &
-                .not. (pull < 0.0_wp .and. extent(2) < measures%free_extent(load%direction, 1) + slack)) cycle
-            key = 'force'
-            if (abs(load%stress) > 0.0_wp) key = 'stress'
-            call add(warnings, place_of(simulation%settings, 'load.'//load%name, key)//': '''//key//''' in &load '// &
-                     load%name//' pulls the wall '//simulation%settings%load(k)%wall//' away from all free bodies. '// &
-                     'A positive value acts along '//simulation%settings%load(k)%direction// &
-                     ', a negative one against it; change the sign')
-         end associate
-      end do
-   end subroutine warn_of_pulls
+      associate (s => simulation%settings, cell => simulation%bodies%cell)
+         if (measures%fixed > 0_lp .or. .not. cell%is_periodic) return
+         if (s%forces%drag > 0.0_wp .or. abs(s%forces%turn_rate) > 0.0_wp) return
+         if (.not. any(abs(s%forces%gravity) > 0.0_wp .and. cell%size > 0.0_wp)) return
+         call add(warnings, place_of(s, 'forces', 'gravity')//': the cell repeats along gravity and has no walls, '// &
+                  'so nothing stops the fall of its bodies. Give gravity = 0, 0 in &forces, walls or drag')
+      end associate
+   end subroutine warn_of_endless_fall
 
-   !> Warn of rows of fixed grains that leave a gap at the border of a periodic cell.
-   subroutine warn_of_rows(settings, warnings)
-      type(settings_t), intent(in) :: settings
+   !> Warn of sinks that bodies may pass between two times at which they may leave.
+   subroutine warn_of_sinks(simulation, warnings)
+      type(simulation_t), intent(in) :: simulation
       type(text_t), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: length(2), gap
+      real(wp) :: thickness, way
       integer :: axis, k
 
-      do k = 1, size(settings%wall)
-         associate (wall => settings%wall(k))
-            if (wall%outline /= 'row') cycle
-            length = abs(wall%to - wall%from)
-            do axis = 1, 2
-               if (scan(settings%cell%periodic, 'xy'(axis:axis)) == 0 .or. length(axis) < 3.0_wp*length(3 - axis)) cycle
-               gap = settings%cell%size(axis) - length(axis)
-               if (gap <= length(axis)/real(wall%segments, wp)) cycle
-               call add(warnings, place_of(settings, 'wall.'//wall%name, 'to')//': the row of &wall '//wall%name// &
-                        ' is '//to_text(length(axis), 3)//' m long, the cell '//to_text(settings%cell%size(axis), 3)// &
-                        ' m: grains pass through the gap of '//to_text(gap, 3)//' m. Let ''from'' and ''to'' be as '// &
-                        'far apart as the cell is long')
-            end do
+      do k = 1, size(simulation%settings%sink)
+         associate (sink => simulation%settings%sink(k), gravity => simulation%settings%forces%gravity)
+            axis = maxloc(abs(gravity), 1)
+            thickness = minval(sink%high - sink%low)
+            if (any(abs(gravity) > 0.0_wp)) thickness = sink%high(axis) - sink%low(axis)
+            way = simulation%expected%speed*real(sink%interval, wp)*simulation%dt
+            if (way <= thickness) cycle
+            call add(warnings, place_of(simulation%settings, 'sink.'//sink%name, 'interval')//': bodies of up to '// &
+                     to_text(simulation%expected%speed, 3)//' m/s ('//simulation%expected%origin//') move '// &
+                     to_text(way, 3)//' m in the '//to_text(sink%interval)//' steps between two times at which '// &
+                     'they may leave, but &sink '//sink%name//' is only '//to_text(thickness, 3)//' m '// &
+                     trim(merge('wide', 'high', axis == 1))//': they pass it. Enlarge it, or reduce ''interval''')
          end associate
       end do
-   end subroutine warn_of_rows
-
-   !> Warn of walls that stand outside a periodic cell: their copies stand in it, mostly among grains.
-   subroutine warn_of_copies(settings, warnings)
-      type(settings_t), intent(in) :: settings
-      type(text_t), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: low(2), high(2)
-      integer :: axis, k
-
-      do k = 1, size(settings%wall)
-         associate (wall => settings%wall(k), cell => settings%cell)
-            select case (wall%outline)
-            case ('rectangle')
-               low = wall%low
-               high = wall%high
-            case ('line')
-               low = min(wall%from, wall%to)
-               high = max(wall%from, wall%to)
-            case default
-               cycle
-            end select
-            do axis = 1, 2
-               if (scan(cell%periodic, 'xy'(axis:axis)) == 0) cycle
-               if (low(axis) < (cell%low(axis) + cell%size(axis))*(1.0_wp - rounding) .and. &
-                   high(axis) > cell%low(axis)*(1.0_wp + rounding)) cycle
-               call add(warnings, place_of(settings, 'wall.'//wall%name, 'name')//': &wall '//wall%name//' stands '// &
-                        'outside the cell along '//'xy'(axis:axis)//', so a copy of it stands inside. A cell needs '// &
-                        'no walls across the axes along which it is periodic; leave it out')
-               exit
-            end do
-         end associate
-      end do
-   end subroutine warn_of_copies
+   end subroutine warn_of_sinks
 
    !> Warn of materials that no body has, and none that will enter.
    subroutine warn_of_materials(settings, of_material, warnings)
@@ -363,15 +322,5 @@ contains
       call add(warnings, 'the run takes up to '//to_text(real(simulation%n_steps, wp), 3)//' steps of '// &
                to_text(simulation%dt, 3)//' s, which is a matter of days. dt follows from '//reason)
    end subroutine warn_of_steps
-
-   !> Append a warning to the list.
-   pure subroutine add(warnings, text)
-      !> The warnings so far
-      type(text_t), allocatable, intent(inout) :: warnings(:)
-      !> The new one
-      character(len=*), intent(in) :: text
-
-      warnings = [warnings, text_t(text)]
-   end subroutine add
 
 end module polydem_entry_warnings

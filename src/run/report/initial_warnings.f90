@@ -3,17 +3,19 @@
 !> Each warning names a probable mistake of the input. The warnings cost no time in a step; the guards that a run
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
-   use polydem_entry_warnings, only: add, warn_of_entries
+   use polydem_elementary, only: hypotenuse
+   use polydem_entry_warnings, only: warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
    use polydem_motion_check, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_parts, only: parts_t
    use polydem_regions, only: is_beside_walls
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: grains_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
+   use polydem_wall_warnings, only: add
    implicit none
    private
    public :: warn_of_risks
@@ -23,6 +25,8 @@ module polydem_initial_warnings
    !> Warning limit of the distance that a body moves in a step, and of the overlap that an impact causes, as a fraction
    !> of the thickness of the thinnest body
    real(wp), parameter :: fast_fraction = 0.25_wp
+   !> Twice the number pi
+   real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Plausible range of the median diameter [m]
    real(wp), parameter :: diameters(2) = [1.0e-6_wp, 1.0_wp]
    !> Range of densities of solids, including foams [kg/m3]
@@ -128,13 +132,45 @@ contains
       integer :: k
 
       if (size(settings%wall) == 0 .or. settings%scene%bodies_file /= '') return
+      ! Walls that go elsewhere may come to the grains.
+      if (any([(moves_away(settings%motion(k)%kind), k=1, size(settings%motion))]) .or. size(settings%load) > 0) return
       parts%walls = settings%wall
       do k = 1, size(settings%grains)
-         if (is_beside_walls(settings%grains(k), parts, settings%forces%gravity)) call add(warnings, &
+         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, settings%grains(k)))) call add(warnings, &
             'the grains of group '//settings%grains(k)%name//' start beside all walls and will meet none; move '// &
             'their region between or above the walls')
       end do
    end subroutine warn_of_regions
+
+   !> Whether a motion brings walls to other places
+   pure logical function moves_away(kind)
+      character(len=*), intent(in) :: kind
+
+      moves_away = kind == 'translation' .or. kind == 'rotation' .or. kind == 'table'
+   end function moves_away
+
+   !> Whether the grains of a group go against and along each axis: by gravity, with their velocity, or through the
+   !> copies of a periodic cell, (axis, sense)
+   pure function ways_of(settings, group) result(ways)
+      type(settings_t), intent(in) :: settings
+      type(grains_settings_t), intent(in) :: group
+      logical :: ways(2, 2)
+      integer :: axis, k
+
+      associate (forces => settings%forces)
+         ways(:, 1) = group%velocity < 0.0_wp .or. forces%gravity < 0.0_wp
+         ways(:, 2) = group%velocity > 0.0_wp .or. forces%gravity > 0.0_wp
+         do k = 1, size(settings%stage)
+            if (size(settings%stage(k)%gravity) /= 2) cycle
+            ways(:, 1) = ways(:, 1) .or. settings%stage(k)%gravity < 0.0_wp
+            ways(:, 2) = ways(:, 2) .or. settings%stage(k)%gravity > 0.0_wp
+         end do
+         do axis = 1, 2
+            ways(axis, :) = ways(axis, :) .or. group%speed > 0.0_wp .or. abs(forces%turn_rate) > 0.0_wp .or. &
+               abs(forces%shake(axis)) > 0.0_wp .or. scan(settings%cell%periodic, 'xy'(axis:axis)) > 0
+         end do
+      end associate
+   end function ways_of
 
    !> Warn of a time step that is unstable as soon as bodies touch.
    subroutine warn_of_step(simulation, warnings)
@@ -188,12 +224,15 @@ contains
       associate (s => simulation)
          thinnest = ' times the thickness of the thinnest body ('//to_text(measures%thickness, 3)//' m, body '// &
             to_text(measures%thinnest)//')'
-         if (measures%move > fast_fraction*measures%thickness) call add(warnings, 'body '// &
-            to_text(measures%farthest)//' moves '//to_text(measures%move/measures%thickness, 3)//thinnest// &
+         mover = 'body '//to_text(measures%farthest)
+         if (measures%move < 1.001_wp*measures%wall_speed*s%dt) &
+            mover = mover//motion_text(s%settings, measures%move/s%dt)
+         if (measures%move > fast_fraction*measures%thickness) call add(warnings, mover//' moves '// &
+            to_text(measures%move/measures%thickness, 3)//thinnest// &
             ' in one step: it may pass through other bodies undetected; '//shorter_step(s%settings%integrate))
          fastest = max(measures%wall_speed, merge(measures%fall_speed, 0.0_wp, measures%free > 0_lp))
          mover = 'a body that falls through the extent'
-         if (measures%wall_speed >= fastest) mover = 'a wall'
+         if (measures%wall_speed >= fastest) mover = 'a wall'//motion_text(s%settings, fastest)
          if (measures%move <= fast_fraction*measures%thickness .and. fastest*s%dt > fast_fraction*measures%thickness) &
             call add(warnings, mover//' reaches '//to_text(fastest, 3)//' m/s and then moves '// &
             to_text(fastest*s%dt/measures%thickness, 3)//thinnest//' in one step; '//shorter_step(s%settings%integrate))
@@ -203,6 +242,27 @@ contains
             ': it may pass through other bodies. Increase stiffness in &forces, or use thicker bodies')
       end associate
    end subroutine warn_of_speeds
+
+   !> Clause about the oscillation that gives a wall most of its speed; empty if there is none
+   pure function motion_text(settings, speed) result(text)
+      type(settings_t), intent(in) :: settings
+      !> Speed of the wall [m/s]
+      real(wp), intent(in) :: speed
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      do k = 1, size(settings%motion)
+         associate (motion => settings%motion(k))
+            if (motion%kind /= 'oscillation') cycle
+            associate (amplitude => hypotenuse(motion%amplitude(1), motion%amplitude(2)))
+               if (two_pi*motion%frequency*amplitude < 0.5_wp*speed) cycle
+               text = ' that shakes with the amplitude '//to_text(amplitude, 3)//' m and the frequency '// &
+                  to_text(motion%frequency, 3)//' Hz (is it in m and in Hz?)'
+            end associate
+         end associate
+      end do
+   end function motion_text
 
    !> Warn of fixed bodies that overlap at the start, unless a load moves one of them: a wall that yields passes over
    !> others. Every rank has all of them.

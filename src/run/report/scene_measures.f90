@@ -3,7 +3,7 @@
 module polydem_scene_measures
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
+   use polydem_contact_depth, only: deepest_contact, depth_share, depth_text, thinner_pieces
    use polydem_contacts, only: contacts_t
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
@@ -16,6 +16,8 @@ module polydem_scene_measures
    use polydem_stability_check, only: find_stable_step
    use polydem_strings, only: to_text
    use polydem_wall, only: greatest_wall_speed
+   use polydem_wall_load, only: along_angle
+   use polydem_walls, only: walls_t
    implicit none
    private
    public :: scene_measures_t, measure_scene
@@ -40,6 +42,10 @@ module polydem_scene_measures
       real(wp) :: density(2) = 0.0_wp
       !> Greatest speed of a free body at the start [m/s]
       real(wp) :: speed = 0.0_wp
+      !> Of each load with a torque: least and greatest distance of a free body from the line through the pivot and the
+      !> centre of its wall, positive where the wall turns to with a positive torque, then the width of the wall across
+      !> this line; the width is 0 if the pivot is within the wall, and for other loads, (3, load) [m]
+      real(wp), allocatable :: sides(:, :)
       !> Greatest speed of any prescribed motion [m/s]
       real(wp) :: wall_speed = 0.0_wp
       !> Speed after a fall through the whole extent [m/s]
@@ -69,7 +75,7 @@ module polydem_scene_measures
       real(wp) :: stored = 0.0_wp
       !> Number of contacts, and number of those deeper than `listed_depth` in &guards
       integer(lp) :: contacts = 0_lp, deep = 0_lp
-      !> Greatest depth of a contact over the thickness of the thinner body
+      !> Greatest depth of a contact over the thickness of the thinner piece
       real(wp) :: depth_share = 0.0_wp
       !> Clause about this contact
       character(len=:), allocatable :: deepest
@@ -86,6 +92,7 @@ contains
       !> A simulation at time 0
       type(simulation_t), intent(inout) :: simulation
       type(scene_measures_t), intent(out) :: measures
+      real(wp), allocatable :: thinner(:)
       real(wp) :: gravity, down(2)
       integer(ip) :: slot
       integer :: k
@@ -93,7 +100,10 @@ contains
       associate (s => simulation, comm => simulation%comm)
          measures%fixed_boxes = count(s%search%boxes%fixed(:s%search%boxes%n), kind=lp)
          measures%boxes = count(.not. s%search%boxes%passive(:s%search%boxes%n), kind=lp)
-         call count_parts(comm, s%bodies, s%contacts, s%settings%guards%listed_depth, measures)
+         associate (pairs => s%search%neighbours%pairs)
+            thinner = thinner_pieces(s%bodies, s%contacts, pairs%first, pairs%second)
+         end associate
+         call count_parts(comm, s%bodies, s%contacts, thinner, s%settings%guards%listed_depth, measures)
          if (allocated(s%bodies%material)) call count_materials(comm, s%bodies, s%law%pairs%n_materials, measures)
          call measure_bodies(comm, s%bodies, measures)
          if (measures%free > 0_lp) measures%diameter(2) = s%search%maker%median_diameter
@@ -106,6 +116,7 @@ contains
             measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls%driven(k), s%bodies%radius, &
                                                                                longest_run(s%settings)))
          end do
+         call measure_sides(comm, s%bodies, s%walls, measures%sides)
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then
             down = abs(s%settings%forces%gravity)/gravity
@@ -118,7 +129,7 @@ contains
          measures%last_bit = spacing(maxval(abs(measures%free_extent)))
       end associate
       call find_stored_energy(simulation%comm, simulation%bodies, simulation%contacts, measures%stored)
-      call measure_contacts(simulation%comm, simulation%bodies, simulation%contacts, measures)
+      call measure_contacts(simulation%comm, simulation%bodies, simulation%contacts, thinner, measures)
       call find_stable_step(simulation, measures%stable_step, slot)
 
    contains
@@ -133,11 +144,13 @@ contains
    end subroutine measure_scene
 
    !> Count bodies, vertices, boxes and contacts.
-   subroutine count_parts(comm, bodies, contacts, limit, measures)
+   subroutine count_parts(comm, bodies, contacts, thinner, limit, measures)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      !> Depth of the contacts that are listed, as a share of the thickness of the thinner body
+      !> Thickness of the thinner piece of each contact [m]
+      real(wp), intent(in) :: thinner(:)
+      !> Depth of the contacts that are listed, as a share of it
       real(wp), intent(in) :: limit
       !> Numbers of bodies, vertices, boxes and contacts are set; on entry `boxes` is that of this rank
       type(scene_measures_t), intent(inout) :: measures
@@ -155,7 +168,7 @@ contains
       do c = 1_ip, contacts%n
          if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
          counts(4) = counts(4) + 1_lp
-         if (depth_share(contacts, bodies%thickness, c) > limit) counts(5) = counts(5) + 1_lp
+         if (depth_share(contacts, thinner, c) > limit) counts(5) = counts(5) + 1_lp
       end do
       call comm%all_reduce_sum(counts)
       measures%free = counts(1)
@@ -184,10 +197,12 @@ contains
    end subroutine count_materials
 
    !> Find the deepest contact in terms of its thinner body, and that with the greatest depth in metres.
-   subroutine measure_contacts(comm, bodies, contacts, measures)
+   subroutine measure_contacts(comm, bodies, contacts, thinner, measures)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
+      !> Thickness of the thinner piece of each contact [m]
+      real(wp), intent(in) :: thinner(:)
       type(scene_measures_t), intent(inout) :: measures
       real(wp) :: depth, greatest
       integer(lp) :: place, longest
@@ -196,10 +211,10 @@ contains
       place = 0_lp
       longest = 0_lp
       greatest = -1.0_wp
-      worst = deepest_contact(contacts, bodies%thickness)
+      worst = deepest_contact(contacts, thinner)
       if (worst > 0_ip) then
-         measures%depth_share = depth_share(contacts, bodies%thickness, worst)
-         measures%deepest = depth_text(bodies, contacts, bodies%thickness, worst)
+         measures%depth_share = depth_share(contacts, thinner, worst)
+         measures%deepest = depth_text(bodies, contacts, thinner, worst)
          place = place_of(bodies, contacts%first(worst), contacts%second(worst))
       end if
       do c = 1_ip, contacts%n
@@ -243,6 +258,63 @@ contains
       call keep_greatest(comm, measures%thickness, measures%thinnest)
       measures%thickness = -measures%thickness
    end subroutine measure_bodies
+
+   !> Find on which side of each wall with a torque the free bodies are.
+   subroutine measure_sides(comm, bodies, walls, sides)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      type(walls_t), intent(in) :: walls
+      !> As in the measures
+      real(wp), allocatable, intent(out) :: sides(:, :)
+      real(wp) :: bounds(3, 2), line(2)
+      integer :: k
+
+      if (.not. allocated(walls%loads)) then
+         allocate (sides(3, 0))
+         return
+      end if
+      allocate (sides(3, size(walls%loads)), source=0.0_wp)
+      do k = 1, size(walls%loads)
+         associate (load => walls%loads(k))
+            if (load%direction /= along_angle) cycle
+            line = walls%named%centre(load%wall, bodies) - load%pivot
+            if (.not. any(abs(line) > 0.0_wp)) cycle
+            line = line/hypotenuse(line(1), line(2))
+            ! The wall: it begins on one side of the pivot.
+            bounds = distances(bodies, walls%named%wall(load%wall)%slots, load%pivot, line)
+            if (bounds(3, 1) < -0.1_wp*bounds(3, 2)) cycle
+            sides(3, k) = bounds(2, 1) - bounds(1, 1)
+            bounds = distances(bodies, bodies%free, load%pivot, line)
+            sides(1:2, k) = bounds(1:2, 1)
+         end associate
+      end do
+      call reduce_to_least(comm, sides(1, :))
+      call reduce_to_greatest(comm, sides(2, :))
+   end subroutine measure_sides
+
+   !> Least and greatest distance of the vertices of some bodies from a line, positive on its left, and least and
+   !> greatest distance along it: (1:2, 1) and (3, 1:2) [m]
+   pure function distances(bodies, slots, point, line) result(bounds)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Point of the line [m], and its direction
+      real(wp), intent(in) :: point(2), line(2)
+      real(wp) :: bounds(3, 2), place(2), across, along
+      integer(ip) :: v
+      integer :: k
+
+      bounds(:, 1) = [huge(1.0_wp), -huge(1.0_wp), huge(1.0_wp)]
+      bounds(:, 2) = -huge(1.0_wp)
+      do k = 1, size(slots)
+         do v = bodies%pieces%vertex_start(slots(k)), bodies%pieces%vertex_start(slots(k) + 1_ip) - 1_ip
+            place = bodies%position(:, slots(k)) + bodies%pieces%turned(:, v) - point
+            across = line(1)*place(2) - line(2)*place(1)
+            along = line(1)*place(1) + line(2)*place(2)
+            bounds(:, 1) = [min(bounds(1, 1), across), max(bounds(2, 1), across), min(bounds(3, 1), along)]
+            bounds(3, 2) = max(bounds(3, 2), along)
+         end do
+      end do
+   end function distances
 
    !> Extend a bounding box to the vertices of a body.
    pure subroutine extend_extent(extent, bodies, s)

@@ -3,6 +3,7 @@ module polydem_fit
    use polydem_arrange, only: arrange_grains, region_t
    use polydem_errors, only: error_t
    use polydem_grain_list, only: grains_t
+   use polydem_grains, only: greatest_length
    use polydem_kinds, only: ip, wp
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: grains_settings_t
@@ -47,6 +48,7 @@ contains
          number = int(0.9_wp*real(number, wp), ip)
       end do
       problem%text = 'asks for '//to_text(group%number)//' grains, but the region has room for '//to_text(number)
+      if (number == 0_ip) problem%text = problem%text//size_text(group, region)
       if (number > 0_ip .and. given%number > 0_ip) problem%text = problem%text//'; lower it to '//to_text(number)
       if (number > 0_ip .and. given%number == 0_ip) problem%text = problem%text//'; give number = '//to_text(number)// &
          ' in its place'
@@ -61,6 +63,20 @@ contains
       if (share > 1.0e-2_wp) problem%text = problem%text//', or multiply all lengths of the grains by '// &
          to_text(rounded(share), 2)
    end subroutine explain
+
+   !> Clause about grains that are longer than their region; empty if they are not
+   pure function size_text(group, region) result(text)
+      type(grains_settings_t), intent(in) :: group
+      type(region_t), intent(in) :: region
+      character(len=:), allocatable :: text
+
+      text = ''
+      associate (extent => maxval(region%corners, 2) - minval(region%corners, 2), length => greatest_length(group))
+         if (length > minval(extent)) text = ': its grains are up to '//to_text(length, 3)// &
+            ' m long, the region is '//to_text(extent(1), 3)//' m wide and '//to_text(extent(2), 3)// &
+            ' m high. Lengths are in m, not in mm'
+      end associate
+   end function size_text
 
    !> A number with the two digits that a message has
    real(wp) function rounded(number)

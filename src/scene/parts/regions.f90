@@ -1,6 +1,7 @@
 !> The regions in which groups of grains start.
 module polydem_regions
    use polydem_arrange, only: loose_spacing, region_t
+   use polydem_grains, only: greatest_length
    use polydem_kinds, only: ip, wp
    use polydem_namelist_values, only: list_text
    use polydem_outlines, only: are_apart, as_corners, contains_all, draw_ring, rectangle
@@ -108,23 +109,28 @@ contains
       end associate
    end subroutine check_walls
 
-   !> Whether a group starts beside all walls, or beyond them in the direction of gravity: its grains will meet none
-   logical function is_beside_walls(group, parts, gravity) result(is_beside)
+   !> Whether a group starts beside all walls, and its grains go nowhere that brings them to one
+   logical function is_beside_walls(group, parts, ways) result(is_beside)
       !> The group
       type(grains_settings_t), intent(in) :: group
       !> Parts, of which the walls are used
       type(parts_t), intent(in) :: parts
-      !> Acceleration of gravity [m/s2]
-      real(wp), intent(in) :: gravity(2)
+      !> Whether its grains go against and along each axis, (axis, sense)
+      logical, intent(in) :: ways(2, 2)
       type(region_t) :: region
       type(polygon_list_t) :: polygons
       type(problem_t) :: problem
       real(wp) :: low(2), high(2), bounds(4)
       integer :: k
 
+      is_beside = .false.
+      ! What a file of outlines has is not known here.
+      if (group%shape == 'outline' .and. size(group%outline) == 0) return
       if (group%region == 'at') then
-         low = group%at
-         high = group%at
+         ! A single grain is centred there, a column stands there.
+         low = group%at - 0.5_wp*greatest_length(group)
+         high = group%at + 0.5_wp*greatest_length(group)
+         if (group%arrangement == 'column') high(2) = high(2) + real(group%number, wp)*group%height
       else
          call draw_region(group, parts, region, problem)
          low = minval(region%corners, 2)
@@ -138,8 +144,8 @@ contains
             bounds = [min(bounds(1:2), minval(vertex, 2)), max(bounds(3:4), maxval(vertex, 2))]
          end associate
       end do
-      where (gravity < 0.0_wp) low = -huge(1.0_wp)
-      where (gravity > 0.0_wp) high = huge(1.0_wp)
+      where (ways(:, 1)) low = -huge(1.0_wp)
+      where (ways(:, 2)) high = huge(1.0_wp)
       is_beside = any(low > bounds(3:4)) .or. any(high < bounds(1:2))
    end function is_beside_walls
 

@@ -1,9 +1,9 @@
 !> Guard of contacts that are deep relative to their bodies.
 module polydem_overlap_guard
-   use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text
+   use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text, thinner_pieces
    use polydem_errors, only: error_t
    use polydem_guard, only: guard_t
-   use polydem_kinds, only: dp, ip
+   use polydem_kinds, only: dp, ip, wp
    use polydem_motion_check, only: shorter_step
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
@@ -37,16 +37,18 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
+      real(wp), allocatable :: thinner(:)
       integer(ip) :: worst
       real(dp) :: share
 
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards, &
-                 thickness => simulation%bodies%thickness)
-         if (any_deeper(s%loop%flagged, thickness, settings%overlap_limit)) then
-            worst = deepest_contact(s%loop%flagged, thickness)
-            text = depth_text(s%bodies, s%loop%flagged, thickness, worst)
-            share = real(depth_share(s%loop%flagged, thickness, worst), dp)
+                 pairs => simulation%search%neighbours%pairs)
+         thinner = thinner_pieces(s%bodies, s%loop%flagged, pairs%first, pairs%second)
+         if (any_deeper(s%loop%flagged, thinner, settings%overlap_limit)) then
+            worst = deepest_contact(s%loop%flagged, thinner)
+            text = depth_text(s%bodies, s%loop%flagged, thinner, worst)
+            share = real(depth_share(s%loop%flagged, thinner, worst), dp)
          end if
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return

@@ -10,7 +10,7 @@ module polydem_relaxation
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_box_maker, only: update_boxes
    use polydem_communicator, only: communicator_t
-   use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
+   use polydem_contact_depth, only: deepest_contact, depth_share, depth_text, thinner_pieces
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: incidence_t, index_contacts
    use polydem_contacts, only: contacts_t
@@ -48,6 +48,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(neighbours_t) :: neighbours
       type(contacts_t) :: contacts
+      real(wp), allocatable :: thinner(:)
       real(wp) :: greatest(1), least, before(2)
       integer(ip) :: worst
       logical :: is_idle
@@ -58,9 +59,10 @@ contains
          call find_overlaps(self, neighbours, contacts, error)
          call self%comm%all_reduce_error(error)
          if (allocated(error)) return
-         worst = deepest_contact(contacts, self%bodies%thickness)
+         thinner = thinner_pieces(self%bodies, contacts, neighbours%pairs%first, neighbours%pairs%second)
+         worst = deepest_contact(contacts, thinner)
          greatest = 0.0_wp
-         if (worst > 0_ip) greatest = depth_share(contacts, self%bodies%thickness, worst)
+         if (worst > 0_ip) greatest = depth_share(contacts, thinner, worst)
          call reduce_to_greatest(self%comm, greatest)
          associate (relaxation => self%relaxation)
             relaxation%after = greatest(1)
@@ -69,7 +71,7 @@ contains
             least = min(least, relaxation%after)
             call check_progress(relaxation, self%bodies, self%comm, least, before, is_idle)
             if (is_idle .or. relaxation%sweeps == most_sweeps) then
-               if (worst > 0_ip) call report_depth(self, contacts, worst, is_idle, error)
+               if (worst > 0_ip) call report_depth(self, contacts, thinner, worst, is_idle, error)
                call self%comm%all_reduce_error(error)
                return
             end if
@@ -151,21 +153,23 @@ contains
    end subroutine find_overlaps
 
    !> Report the deepest contact of all ranks. Two ranks may have it.
-   subroutine report_depth(self, contacts, worst, is_idle, error)
+   subroutine report_depth(self, contacts, thinner, worst, is_idle, error)
       type(simulation_t), intent(in) :: self
       type(contacts_t), intent(in) :: contacts
+      !> Thickness of the thinner piece of each contact [m]
+      real(wp), intent(in) :: thinner(:)
       integer(ip), intent(in) :: worst
       !> Whether the last sweeps brought no progress
       logical, intent(in) :: is_idle
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: idle
 
-      if (depth_share(contacts, self%bodies%thickness, worst) < self%relaxation%after) return
+      if (depth_share(contacts, thinner, worst) < self%relaxation%after) return
       idle = ''
       if (is_idle) idle = ', the last '//to_text(most_idle_sweeps)//' without progress,'
       call raise(error, input_error, place_of(self%settings, 'scene', 'remove_overlap')//': after '// &
                  to_text(self%relaxation%sweeps)//' sweeps'//idle//' '// &
-                 depth_text(self%bodies, contacts, self%bodies%thickness, worst)// &
+                 depth_text(self%bodies, contacts, thinner, worst)// &
                  '. Provide more space for the bodies, or increase remove_overlap in &scene')
    end subroutine report_depth
 

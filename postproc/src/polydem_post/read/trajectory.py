@@ -506,9 +506,14 @@ def input_of(folder: Path) -> str:
     return _entry_of(folder, "provenance/resolved_input")
 
 
+def warnings_of(folder: Path) -> str:
+    """Numbers of warnings of each kind of the run of a result folder, in words; empty if there is none."""
+    return _entry_of(folder, "warnings")
+
+
 def _entry_of(folder: Path, name: str) -> str:
     try:
         with reading(folder / "profile.h5") as file:
-            return str(plain(file[name]))
+            return str(plain(file[name])) if name in file else ""
     except ResultError:
         return ""

@@ -45,6 +45,13 @@ OWN_ENTRY = "output.folder"
 #: The table of a motion in a namelist or a list of overrides
 TABLE_OF_MOTION = re.compile(r"""\bfile\s*=\s*['"]?([^'"\s,/][^'"\n,]*)""", re.IGNORECASE)
 
+#: Values as in other programs, from:to or from:to:step
+RANGE = re.compile(r"[-+.\deE]+(:[-+.\deE]+){1,2}")
+
+#: How values are listed
+LISTING = ("as in forces.friction_coefficient=0.1,0.2, or with semicolons if they have commas: "
+           "'forces.gravity=0,-9.81;0,-1'")
+
 #: So many wrong rows are told
 MOST_TOLD = 100
 
@@ -240,6 +247,12 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
             continue
         entry, values = match.group(1), match.group(2)
         problems += _problems_of_entry(text, entry)
+        if re.search(r"[\[\](){}]", values):
+            problems.append(f"{text}: values stand without brackets, {LISTING}")
+        elif RANGE.fullmatch(values):
+            problems.append(f"{text}: is no range; write the values out, {LISTING}")
+        if problems:
+            continue
         if entry in columns + entries:
             problems.append(f"{text}: {entry} is given twice")
         entries.append(entry)
@@ -342,4 +355,14 @@ def _problems_of_rows(base: Path, program: Path, rows: list[Row], overrides: lis
         return found
 
     with ThreadPoolExecutor(max(1, cores)) as pool:
-        return [f"{row.place}: {text}" for row, texts in zip(rows, pool.map(all_problems, overrides)) for text in texts]
+        return [f"{row.place}: {text}{_advice(row, text)}"
+                for row, texts in zip(rows, pool.map(all_problems, overrides)) for text in texts]
+
+
+def _advice(row: Row, text: str) -> str:
+    """What was probably meant by a wrong number of values."""
+    if LISTED_ENTRY.match(row.place) and re.search(r"takes \d+ values, but 1 value is given", text):
+        return f"; values are listed {LISTING}"
+    if not LISTED_ENTRY.match(row.place) and re.search(r"takes 1 value, but \d+ values are given", text):
+        return f"; a row is one run, and lists of values stand behind the namelist, {LISTING}"
+    return ""

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..base.new_file import NewHdf5, new_file
 from ..base.result_file import ResultError, cannot_write
-from ..read.trajectory import Trajectory
+from ..read.trajectory import Trajectory, warnings_of
 from .batch import NAME, Run, Sweep
-from .runner import FAILING, FINISHED, RUNNING, describe, last_words, state_of
+from .runner import FAILING, FINISHED, RUNNING, describe, last_words, runs_with_warnings, state_of
 
 #: Names of the two files in the folder of a sweep
 CSV_FILE, HDF5_FILE = "results.csv", "results.h5"
@@ -28,6 +28,7 @@ COLUMNS = {
     "revision": ("1", "commit of the program"),
     "state_hash": ("1", "hash of the bits of the last state"),
     "message": ("1", "why it did not finish"),
+    "warnings": ("1", "numbers of its warnings of each kind, in words; empty without one"),
 }
 
 #: Columns that hold numbers; the others hold texts
@@ -77,7 +78,7 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
         raise cannot_write(sweep.folder, error) from error
     finished = [outcome for outcome in outcomes if outcome.facts["state"] == FINISHED]
     say(f"{len(finished)} of {len(outcomes)} runs are finished")
-    for line in same_states(finished):
+    for line in runs_with_warnings(sweep.runs) + same_states(finished):
         say(line)
     return outcomes
 
@@ -119,7 +120,8 @@ def read_outcome(run: Run) -> Outcome:
         facts["message"] = last_words(run)
     try:
         result = Trajectory(run.result)
-        facts.update(revision=result.provenance["revision"], state_hash=result.state_hash)
+        facts.update(revision=result.provenance["revision"], state_hash=result.state_hash,
+                     warnings=warnings_of(run.result))
         profile = result.profile
         outcome.stages = {stage: float(total) for stage, total, calls in
                           zip(profile["stage"], profile["total"], profile["calls"]) if calls > 0}

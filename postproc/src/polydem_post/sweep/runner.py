@@ -22,7 +22,7 @@ from typing import TextIO
 
 from ..base.result_file import ResultError, insist_on_file, reason
 from ..read.settings import Settings
-from ..read.trajectory import input_of, status_of
+from ..read.trajectory import input_of, status_of, warnings_of
 from .batch import ATTEMPTS, INPUT, OUTPUT, Run
 
 #: Exit code of a run that was asked to end and can go on from a checkpoint
@@ -130,7 +130,19 @@ def describe(run: Run) -> str:
     state, attempts = state_of(run), run.attempts()
     if state == FAILING:
         return f"{run.name}: failed with exit code {attempts[-1]['exit_code']}: {last_words(run)}"
-    return f"{run.name}: {state}" + (f" after {attempts[-1]['seconds']:.1f} s" if attempts else "")
+    told = warnings_of(run.result) if state == FINISHED else ""
+    return (f"{run.name}: {state}" + (f" after {attempts[-1]['seconds']:.1f} s" if attempts else "")
+            + (f" with warnings: {told}" if told else ""))
+
+
+def runs_with_warnings(runs: list[Run]) -> list[str]:
+    """One line about the finished runs that have warnings; none if there is none."""
+    names = [run.name for run in runs if state_of(run) == FINISHED and warnings_of(run.result)]
+    if not names:
+        return []
+    more = [f"{len(names) - MOST_NAMED} more"] if len(names) > MOST_NAMED else []
+    return [f"{len(names)} of {len(runs)} runs have warnings, which their logs and the column warnings of a collected "
+            f"table tell: {', '.join([*names[:MOST_NAMED], *more])}"]
 
 
 def progress_of(runs: list[Run], waiting: int) -> str:
@@ -231,6 +243,8 @@ class Runner:
     def _verdict(self, runs: list[Run]) -> int:
         states = [state_of(run) for run in runs]
         self.say(", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states)))
+        for line in runs_with_warnings(runs):
+            self.say(line)
         if all(state == FINISHED for state in states):
             return 0
         if all(state in (FINISHED, FAILING) for state in states):
