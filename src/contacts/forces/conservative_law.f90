@@ -27,6 +27,7 @@ module polydem_conservative_law
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
+   use polydem_overlap_measure, only: effective_area
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -62,7 +63,7 @@ contains
       associate (unused => settings)
       end associate
       self%stage = stage_elastic
-      self%needs_effective_area = .true.
+      self%overlap_measure = effective_area
       self%energy_is_known = .true.
       self%stiffness = pairs%stiffness
    end subroutine configure
