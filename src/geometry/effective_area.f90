@@ -61,7 +61,7 @@ contains
       real(wp), intent(inout) :: place(corners, 2)
       !> The overlap with the true area; afterwards with that of the measure
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: unit_area, square, moments(3), form(3), determinant, root, unit, even, polar, moment
+      real(wp) :: unit_area, square, moments(3), form(3), determinant, unit, even, moment
       real(wp) :: c(2), p(2), step(2), weight(3), along(2)
       integer(ip) :: i, j
 
@@ -73,21 +73,7 @@ contains
          overlap = overlap_t()
          return
       end if
-      root = sqrt(12.0_wp*sqrt(determinant))
-      unit = root/(24.0_wp*determinant)
-      ! Terms of Simpson's rule: unit*level for the quadratic part of the weight, and a sixth of its constant part
-      form = by%share_effective*moments
-      even = 0.0_wp
-      if (by%power > 0.0_wp) then
-         polar = square*moments(1) + unit_area*(unit_area/square)*moments(3)
-         overlap%length_square = 12.0_wp*(unit_area*polar/overlap%area)
-         if (.not. by%share_effective > 0.0_wp) root = overlap%area/unit_area
-         even = ((1.0_wp - by%share_effective) + 0.5_wp*by%power)/6.0_wp*(unit_area*root/overlap%area)
-         polar = by%power/12.0_wp*(root/(unit*polar))
-         form(3) = form(3) - polar*square
-         form(1) = form(1) - polar*(unit_area*(unit_area/square))
-      end if
-      overlap%area = unit_area*root
+      call find_weight(by, moments, determinant, square, unit_area, unit, form, even, overlap)
       overlap%normal = 0.0_wp
       moment = 0.0_wp
       do i = 1_ip, n
@@ -118,6 +104,35 @@ contains
       end function level
 
    end subroutine weigh_by_shape
+
+   !> Find area and length of an overlap, and the weight of its normal: a factor times a quadratic form, and a constant.
+   pure subroutine find_weight(by, moments, determinant, square, unit_area, unit, form, even, overlap)
+      type(overlap_measure_t), intent(in) :: by
+      !> Second moments (xx, xy, yy) in scaled coordinates, and their determinant
+      real(wp), intent(in) :: moments(3), determinant
+      !> Square of the unit along the loop, and area of the unit square [m2]
+      real(wp), intent(in) :: square, unit_area
+      !> A sixth of the weight, as Simpson's rule needs it: factor and coefficients (yy, xy, xx) of the form, constant
+      real(wp), intent(out) :: unit, form(3), even
+      !> The overlap with the true area
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: root, polar
+
+      root = sqrt(12.0_wp*sqrt(determinant))
+      unit = root/(24.0_wp*determinant)
+      form = by%share_effective*moments
+      even = 0.0_wp
+      if (by%power > 0.0_wp) then
+         polar = square*moments(1) + unit_area*(unit_area/square)*moments(3)
+         overlap%length_square = 12.0_wp*(unit_area*polar/overlap%area)
+         if (.not. by%share_effective > 0.0_wp) root = overlap%area/unit_area
+         even = ((1.0_wp - by%share_effective) + 0.5_wp*by%power)/6.0_wp*(unit_area*root/overlap%area)
+         polar = by%power/12.0_wp*(root/(unit*polar))
+         form(3) = form(3) - polar*square
+         form(1) = form(1) - polar*(unit_area*(unit_area/square))
+      end if
+      overlap%area = unit_area*root
+   end subroutine find_weight
 
    !> Coordinates of a loop along and across the line from its first vertex to the farthest one, scaled to about 1.
    pure subroutine straighten(n, corners, vertex, place, square, unit_area)

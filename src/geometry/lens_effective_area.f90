@@ -236,7 +236,7 @@ contains
       type(lens_work_t), intent(inout) :: lens
       type(overlap_columns_t), intent(inout) :: columns
       real(wp) :: zx, zy, zz, h, cx, cy, mxx, mxy, myy, dxx, dxy, dyy, fx, fy, kxx, kxy, kyy
-      real(wp) :: determinant, product, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
+      real(wp) :: determinant, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
       integer(ip) :: i
 
       do i = 1_ip, n
@@ -250,7 +250,6 @@ contains
          mxy = work%second(i, 2, 1) + work%second(i, 2, 2)
          myy = work%second(i, 3, 1) + work%second(i, 3, 2)
          determinant = mxx*myy - mxy*mxy
-         product = mxx*myy
          safe = max(determinant, least_determinant)
          root = sqrt(12.0_wp*sqrt(safe))
          unit = root/(24.0_wp*safe)
@@ -263,8 +262,7 @@ contains
          dxx = 0.5_wp*(work%second(i, 1, 1) - work%second(i, 1, 2)) - cy*(0.25_wp*twelfth + 0.25_wp*cx*cx)
          dxy = 0.5_wp*(work%second(i, 2, 1) - work%second(i, 2, 2)) - 0.25_wp*cx*cy*cy
          dyy = 0.5_wp*(work%second(i, 3, 1) - work%second(i, 3, 2)) - 0.25_wp*cy*cy*cy
-         ! The quadratic form of the weight, six times its mean on the chord, and half its derivative along the chord at
-         ! the middle
+         ! Quadratic form of the weight, six times its mean on the chord, and half its slope along it at the middle
          kxx = share*myy - work%polar(i)*zz
          kxy = share*mxy
          kyy = share*mxx - work%polar(i)*(h*(h/zz))
@@ -286,13 +284,24 @@ contains
          columns%arm_second(i, 2) = gy - lens%centre(i, 4)
          columns%moment(i, 1) = turn + cross(columns%arm_first(i, :), columns%normal(i, :))
          columns%moment(i, 2) = turn + cross(columns%arm_second(i, :), columns%normal(i, :))
-         worst = min(zz - 4.0_wp*no_length**2*area, &
-                     columns%length(i)*columns%length(i) - 4.0_wp*no_length**2*columns%area(i))
-         worst = min(worst, min(determinant - least_determinant, determinant - least_ratio*product))
-         worst = min(worst, area - sure_area*lens%radius(i, 1)*lens%radius(i, 1))
+         worst = certificate(zz, area, columns%length(i), columns%area(i), determinant, mxx*myy, lens%radius(i, 1))
          lens%certified(i) = min(lens%certified(i), worst)
       end do
    end subroutine weigh
+
+   !> Positive if chord, area, contact length and moments of a lens are beyond their rounding errors
+   pure real(wp) function certificate(square, area, length, measured, determinant, product, radius)
+      !> Square of the chord, area, contact length and measure
+      real(wp), intent(in) :: square, area, length, measured
+      !> Determinant of the moments, and product of both
+      real(wp), intent(in) :: determinant, product
+      !> Radius of P
+      real(wp), intent(in) :: radius
+
+      certificate = min(square - 4.0_wp*no_length**2*area, length*length - 4.0_wp*no_length**2*measured)
+      certificate = min(certificate, min(determinant - least_determinant, determinant - least_ratio*product))
+      certificate = min(certificate, area - sure_area*radius*radius)
+   end function certificate
 
    !> Cross product of two vectors
    pure real(wp) function cross(a, b)

@@ -138,7 +138,8 @@ contains
       end if
       do k = 1, size(law%parts)
          associate (part => law%parts(k)%part)
-            if (part%needs_cohesion .and. .not. part%cohesion_has_energy) law%energy_is_known = .false.
+            if (part%needs_cohesion .and. (.not. part%cohesion_has_energy .or. law%overlap_measure%power > 0.0_wp)) &
+               law%energy_is_known = .false.
          end associate
       end do
       law%description = trim(adjustl(law%description))
@@ -291,7 +292,11 @@ contains
             is_weak = is_weak .or. (part%dissipates .and. part%is_weak)
          end associate
       end do
-      if (.not. law%energy_is_known) note = note//', the area law gains energy where slender bodies rock'
+      if (.not. law%overlap_measure%has_moments) then
+         note = note//', the area law gains energy where slender bodies rock'
+      else if (.not. law%energy_is_known) then
+         note = note//', cohesion has no potential with this law'
+      end if
       if (.not. damps) note = note//', nothing is damped'
       if (damps .and. is_weak) note = note//', damping is weak'
       if (damps .and. .not. damps_tilts) note = note//', tilts are not damped'
