@@ -17,6 +17,7 @@ module polydem_clipping
    use polydem_exact_cross, only: exact_cross
    use polydem_kinds, only: ip, wp
    use polydem_overlap_integrals, only: integrate_loop, overlap_t
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_overlap_tolerances, only: far, roundoff, separable_area
    implicit none
    private
@@ -32,27 +33,27 @@ contains
    !> If the radii are equal, each polygon clips the other and the results are averaged: half of a common edge belongs
    !> to each, and an exchange of the polygons changes no bit but signs. Complexity: O(n m) at worst for n and m
    !> vertices.
-   pure subroutine clip_overlap(p, q, offset, radius_p, radius_q, effective, overlap)
+   pure subroutine clip_overlap(p, q, offset, radius_p, radius_q, measure, overlap)
       !> Vertices of P and of Q, anticlockwise, each relative to its own centre, which is inside, (2, n) and (2, m) [m]
       real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
       real(wp), intent(in) :: offset(2)
       !> Radii of P and of Q, that of P not greater than that of Q [m]
       real(wp), intent(in) :: radius_p, radius_q
-      !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`)
-      logical, intent(in) :: effective
+      !> How the overlap is measured
+      type(overlap_measure_t), intent(in) :: measure
       !> The overlap; a is P, b is Q
       type(overlap_t), intent(out) :: overlap
       type(overlap_t) :: other
       integer(ip) :: edge
 
-      call clip(p, q, offset, radius_p, effective, overlap)
+      call clip(p, q, offset, radius_p, measure, overlap)
       overlap%centroid_b = overlap%centroid - offset
       overlap%normal = -overlap%normal
       overlap%moment_a = -overlap%moment_a
       overlap%moment_b = -overlap%moment_b
       if (.not. radius_p < radius_q) then
-         call clip(q, p, -offset, radius_q, effective, other)
+         call clip(q, p, -offset, radius_q, measure, other)
          overlap = mean(overlap, other, offset)
       end if
       if (overlap%area > separable_area*radius_p*radius_p) return
@@ -77,6 +78,7 @@ contains
       mean%normal = 0.5_wp*(forward%normal + back%normal)
       mean%moment_a = 0.5_wp*(forward%moment_a + back%moment_b)
       mean%moment_b = 0.5_wp*(forward%moment_b + back%moment_a)
+      mean%length_square = 0.5_wp*(forward%length_square + back%length_square)
    end function mean
 
    !> First edge of one polygon that separates it from another, 0 if there is none
@@ -141,14 +143,14 @@ contains
    !>
    !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
    !> the subject's centre, `moment_b` about the clipper's.
-   pure subroutine clip(subject, clipper, offset, scale, by_shape, overlap)
+   pure subroutine clip(subject, clipper, offset, scale, by, overlap)
       real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
       !> Centre of the clipper minus centre of the subject
       real(wp), intent(in) :: offset(2)
       !> Size of the subject
       real(wp), intent(in) :: scale
-      !> Whether to compute the effective area
-      logical, intent(in) :: by_shape
+      !> How the overlap is measured
+      type(overlap_measure_t), intent(in) :: by
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(usual_corners, 2, 2), work(usual_corners, 2)
       logical :: on_clipper(usual_corners, 2)
@@ -157,31 +159,31 @@ contains
       ! Each edge of the clipper adds at most one vertex.
       corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
       if (corners <= usual_corners) then
-         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, work, &
+         call clip_in(subject, clipper, offset, scale, by, usual_corners, vertex, on_clipper, work, &
                       overlap)
       else
-         call clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
+         call clip_many(subject, clipper, offset, scale, by, corners, overlap)
       end if
    end subroutine clip
 
    !> As `clip`, with work arrays for `corners` vertices
-   pure subroutine clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
+   pure subroutine clip_many(subject, clipper, offset, scale, by, corners, overlap)
       real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
       real(wp), intent(in) :: offset(2), scale
-      logical, intent(in) :: by_shape
+      type(overlap_measure_t), intent(in) :: by
       integer(ip), intent(in) :: corners
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(corners, 2, 2), work(corners, 2)
       logical :: on_clipper(corners, 2)
 
-      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
+      call clip_in(subject, clipper, offset, scale, by, corners, vertex, on_clipper, work, overlap)
    end subroutine clip_many
 
    !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
-   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
+   pure subroutine clip_in(subject, clipper, offset, scale, by, corners, vertex, on_clipper, work, overlap)
       real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
       real(wp), intent(in) :: offset(2), scale
-      logical, intent(in) :: by_shape
+      type(overlap_measure_t), intent(in) :: by
       !> Capacity of the arrays, in vertices
       integer(ip), intent(in) :: corners
       !> Vertices (corner, x or y, loop)
@@ -220,8 +222,9 @@ contains
          k = merge(1_ip, k + 1_ip, k == m)
       end do
       call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
-      if (.not. (by_shape .and. overlap%area > 0.0_wp)) return
-      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, vertex(:, :, 3_ip - now), overlap)
+      if (.not. (by%has_moments .and. overlap%area > 0.0_wp)) return
+      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, by, vertex(:, :, 3_ip - now), &
+                          overlap)
    end subroutine clip_in
 
    !> Depth of the subject's centre below all edges of the clipper

@@ -33,17 +33,18 @@
 module polydem_effective_area
    use polydem_kinds, only: ip, wp
    use polydem_overlap_integrals, only: overlap_t
+   use polydem_overlap_measure, only: overlap_measure_t
    implicit none
    private
    public :: weigh_by_shape
 
 contains
 
-   !> Replace area, normal and moments of an overlap by those of the effective area.
+   !> Replace area, normal and moments of an overlap by those of a measure.
    !>
    !> `moment_a` is about the origin, `moment_b` about the clipper's centre. If rounding leaves the loop no area, the
    !> overlap becomes zero.
-   pure subroutine weigh_by_shape(n, corners, vertex, on_clipper, offset, place, overlap)
+   pure subroutine weigh_by_shape(n, corners, vertex, on_clipper, offset, by, place, overlap)
       !> Number of vertices
       integer(ip), intent(in) :: n
       !> Capacity of the arrays, in vertices
@@ -54,25 +55,25 @@ contains
       logical, intent(in) :: on_clipper(corners)
       !> Centre of the clipper [m]
       real(wp), intent(in) :: offset(2)
+      !> How the overlap is measured, with moments
+      type(overlap_measure_t), intent(in) :: by
       !> Work space: scaled coordinates, (corner, along or across)
       real(wp), intent(inout) :: place(corners, 2)
-      !> The overlap with the true area; afterwards with the effective area
+      !> The overlap with the true area; afterwards with that of the measure
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: unit_area, moments(3), determinant, root, unit, moment, weight(3), along(2)
-      real(wp) :: c(2), p(2), step(2)
+      real(wp) :: unit_area, square, moments(3), form(3), determinant, unit, even, moment
+      real(wp) :: c(2), p(2), step(2), weight(3), along(2)
       integer(ip) :: i, j
 
       c = overlap%centroid
-      call straighten(n, corners, vertex, place, unit_area)
+      call straighten(n, corners, vertex, place, square, unit_area)
       call measure(n, corners, place, moments)
       determinant = moments(1)*moments(3) - moments(2)**2
       if (.not. determinant > 0.0_wp) then
          overlap = overlap_t()
          return
       end if
-      root = sqrt(12.0_wp*sqrt(determinant))
-      unit = root/(24.0_wp*determinant)
-      overlap%area = unit_area*root
+      call find_weight(by, moments, determinant, square, unit_area, unit, form, even, overlap)
       overlap%normal = 0.0_wp
       moment = 0.0_wp
       do i = 1_ip, n
@@ -81,9 +82,9 @@ contains
          p = vertex(i, :) - c
          step = vertex(j, :) - vertex(i, :)
          ! Terms of Simpson's rule at both ends and in the middle (the latter four times as large)
-         weight(1) = unit*level(place(i, 1), place(i, 2))
-         weight(2) = unit*level(place(j, 1), place(j, 2))
-         weight(3) = unit*level(place(i, 1) + place(j, 1), place(i, 2) + place(j, 2))
+         weight(1) = unit*level(place(i, 1), place(i, 2)) + even
+         weight(2) = unit*level(place(j, 1), place(j, 2)) + even
+         weight(3) = unit*level(place(i, 1) + place(j, 1), place(i, 2) + place(j, 2)) + 4.0_wp*even
          overlap%normal(1) = overlap%normal(1) + (weight(1) + weight(2) + weight(3))*step(2)
          overlap%normal(2) = overlap%normal(2) - (weight(1) + weight(2) + weight(3))*step(1)
          along(1) = step(1)*p(1) + step(2)*p(2)
@@ -95,23 +96,52 @@ contains
 
    contains
 
-      !> The quadratic form q at a point, times the determinant
+      !> The quadratic part of the weight at a point; that of the effective area is q times the determinant
       pure real(wp) function level(x, y)
          real(wp), intent(in) :: x, y
 
-         level = moments(3)*x*x - 2.0_wp*moments(2)*x*y + moments(1)*y*y
+         level = form(3)*x*x - 2.0_wp*form(2)*x*y + form(1)*y*y
       end function level
 
    end subroutine weigh_by_shape
 
+   !> Find area and length of an overlap, and the weight of its normal: a factor times a quadratic form, and a constant.
+   pure subroutine find_weight(by, moments, determinant, square, unit_area, unit, form, even, overlap)
+      type(overlap_measure_t), intent(in) :: by
+      !> Second moments (xx, xy, yy) in scaled coordinates, and their determinant
+      real(wp), intent(in) :: moments(3), determinant
+      !> Square of the unit along the loop, and area of the unit square [m2]
+      real(wp), intent(in) :: square, unit_area
+      !> A sixth of the weight, as Simpson's rule needs it: factor and coefficients (yy, xy, xx) of the form, constant
+      real(wp), intent(out) :: unit, form(3), even
+      !> The overlap with the true area
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: root, polar
+
+      root = sqrt(12.0_wp*sqrt(determinant))
+      unit = root/(24.0_wp*determinant)
+      form = by%share_effective*moments
+      even = 0.0_wp
+      if (by%power > 0.0_wp) then
+         polar = square*moments(1) + unit_area*(unit_area/square)*moments(3)
+         overlap%length_square = 12.0_wp*(unit_area*polar/overlap%area)
+         if (.not. by%share_effective > 0.0_wp) root = overlap%area/unit_area
+         even = ((1.0_wp - by%share_effective) + 0.5_wp*by%power)/6.0_wp*(unit_area*root/overlap%area)
+         polar = by%power/12.0_wp*(root/(unit*polar))
+         form(3) = form(3) - polar*square
+         form(1) = form(1) - polar*(unit_area*(unit_area/square))
+      end if
+      overlap%area = unit_area*root
+   end subroutine find_weight
+
    !> Coordinates of a loop along and across the line from its first vertex to the farthest one, scaled to about 1.
-   pure subroutine straighten(n, corners, vertex, place, unit_area)
+   pure subroutine straighten(n, corners, vertex, place, square, unit_area)
       integer(ip), intent(in) :: n, corners
       real(wp), intent(in) :: vertex(corners, 2)
       real(wp), intent(inout) :: place(corners, 2)
-      !> Area of the unit square of the scaled coordinates [m2]
-      real(wp), intent(out) :: unit_area
-      real(wp) :: axis(2), arm(2), square, longest, scale
+      !> Square of the unit along the line, and area of the unit square of the scaled coordinates [m2]
+      real(wp), intent(out) :: square, unit_area
+      real(wp) :: axis(2), arm(2), longest, scale
       integer(ip) :: i
 
       longest = 0.0_wp
@@ -123,6 +153,7 @@ contains
          longest = max(longest, square)
          place(i, :) = arm
       end do
+      square = longest
       unit_area = 0.0_wp
       do i = 1_ip, n
          arm = place(i, :)

@@ -5,6 +5,7 @@ module polydem_evaluate_batch
    use polydem_lens_kernel_avx2, only: evaluate_with_avx2 => evaluate_batch
    use polydem_lens_kernel_base, only: evaluate_with_base => evaluate_batch
    use polydem_overlap_batch, only: overlap_batch_t, overlap_columns_t
+   use polydem_overlap_measure, only: overlap_measure_t
    implicit none
    private
    public :: evaluate_batch
@@ -12,14 +13,14 @@ module polydem_evaluate_batch
 contains
 
    !> Evaluate the first lanes of a batch.
-   pure subroutine evaluate_batch(batch, n, turned, effective, isa, columns)
+   pure subroutine evaluate_batch(batch, n, turned, measure, isa, columns)
       type(overlap_batch_t), intent(inout) :: batch
       !> Number of lanes
       integer(ip), intent(in) :: n
       !> Vertices of all polygons, anticlockwise, each relative to its own centre, (2, n) [m]
       real(wp), intent(in), contiguous :: turned(:, :)
-      !> Whether to compute the effective area (see `polydem_effective_area`) instead of the area
-      logical, intent(in) :: effective
+      !> How the overlaps are measured
+      type(overlap_measure_t), intent(in) :: measure
       !> Instruction set of the kernels
       integer, intent(in) :: isa
       !> The overlaps; these lanes are written
@@ -27,9 +28,9 @@ contains
 
       if (n == 0_ip) return
       if (isa == isa_avx2) then
-         call evaluate_with_avx2(batch, n, turned, effective, columns)
+         call evaluate_with_avx2(batch, n, turned, measure, columns)
       else
-         call evaluate_with_base(batch, n, turned, effective, columns)
+         call evaluate_with_base(batch, n, turned, measure, columns)
       end if
    end subroutine evaluate_batch
 

@@ -52,6 +52,7 @@ contains
          columns%normal(i, 1) = zy
          columns%normal(i, 2) = -zx
          columns%length(i) = sqrt(zx*zx + zy*zy)
+         columns%length_square(i) = 0.0_wp
          columns%moment(i, 1) = -(zx*(mx - lens%centre(i, 1)) + zy*(my - lens%centre(i, 2)))
          columns%moment(i, 2) = -(zx*(mx - lens%centre(i, 3)) + zy*(my - lens%centre(i, 4)))
          lens%certified(i) = min(lens%certified(i), &

@@ -1,20 +1,26 @@
-!> Effective area of lenses (see `polydem_effective_area`), for all lanes of a batch at a time.
+!> Measures of lenses by their moments (see `polydem_overlap_measure`), for all lanes of a batch at a time.
 !>
 !> The coordinates are x along the chord z from the first crossing X to the second one Y, in units of its length, and
 !> y across it, so scaled that the greatest is 1; h is the area of their unit square. Then X is at (-1/2, 0), Y at
 !> (1/2, 0), and P's arc lies at negative y. The second moments of the lens about its centroid c are the sums over
 !> both arcs.
 !>
-!> The gradient is the integral of (G/4) q n over P's arc. By the divergence theorem it is the same integral over the
-!> chord plus the integral of the gradient of (G/4) q over the part of the lens on P's side; the moment likewise. With
+!> The gradient of the effective area is the integral of (G/4) q n over P's arc. By the divergence theorem it is the
+!> same integral over the chord plus the integral of the gradient of (G/4) q over the part of the lens on P's side; the
+!> moment likewise. With
 !> the moments m of the lens, the form L(x, y) = m_yy x^2 - 2 m_xy x y + m_xx y^2 = q det, and the first and second
 !> moments F and D of P's part about c, the integrals over the chord are closed forms in m and c, those over the part
 !> linear in F and D. The moments of Q's part are opposite, since those about c vanish for the whole. So half the
 !> difference of both parts serves as F and D, and an exchange of P and Q changes no bit but signs.
+!>
+!> A measure that is divided by a power of L adds a constant to the weight, of which only the integral over the chord is
+!> left, and a multiple of |x - c|^2, which is added to the coefficients of L(x, y). The moment of its gradient about c
+!> vanishes everywhere.
 module polydem_lens_effective_area
    use polydem_kinds, only: ip, wp
    use polydem_lens_work, only: lens_work_t
    use polydem_overlap_batch, only: column_length, overlap_columns_t
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_overlap_tolerances, only: least_square, no_length, sure_area
    implicit none
    private
@@ -27,6 +33,10 @@ module polydem_lens_effective_area
    real(wp), parameter :: least_determinant = 2.0_wp**(-11)
    !> Least ratio of the determinant to the product of both moments; below, digits would be lost
    real(wp), parameter :: least_ratio = 2.0_wp**(-4)
+   !> Least polar moment in units of the square of the chord and of the area of the unit square. It is below that of
+   !> every certified lens, whose determinant is at least `least_determinant`, and whose moment across the chord is at
+   !> most its area, less than 300
+   real(wp), parameter :: least_polar = least_determinant*2.0_wp**(-9)
    real(wp), parameter :: third = 1.0_wp/3.0_wp, sixth = 1.0_wp/6.0_wp, twelfth = 1.0_wp/12.0_wp
 
    !> Work space of a batch
@@ -41,14 +51,18 @@ module polydem_lens_effective_area
       real(wp) :: centroid(column_length, 2)
       !> Integrals over each arc for the second moments xx, xy, yy about the centroid
       real(wp) :: second(column_length, 3, 2)
+      !> Constant part of the weight, its part in proportion to |x - c|^2 in the unit of the form L(x, y)
+      real(wp) :: even(column_length), polar(column_length)
    end type work_t
 
 contains
 
-   !> Effective area, its gradient, moments, and the centroid of all lenses.
-   pure subroutine integrate_effective_area(n, lens, columns)
+   !> Measure, gradient, moments, and the centroid of all lenses.
+   pure subroutine integrate_effective_area(n, measure, lens, columns)
       !> Number of lanes
       integer(ip), intent(in) :: n
+      !> The measure, with moments
+      type(overlap_measure_t), intent(in) :: measure
       !> The batch with crossings
       type(lens_work_t), intent(inout) :: lens
       !> Overlaps of these lanes
@@ -61,7 +75,8 @@ contains
       call find_centroid(n, work%fan(:, :, 1), work%fan(:, :, 2), work%centroid)
       call find_second_moments(n, work%place(:, :, :, 1), work%centroid, -0.5_wp, work%second(:, :, 1))
       call find_second_moments(n, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
-      call weigh(n, work, lens, columns)
+      call find_parts_of_weight(n, measure, work, columns)
+      call weigh(n, measure%share_effective, work, lens, columns)
    end subroutine integrate_effective_area
 
    !> Find the coordinates of the corners along and across the chord.
@@ -180,14 +195,48 @@ contains
       end do
    end subroutine find_second_moments
 
-   !> Compute the results from the moments.
-   pure subroutine weigh(n, work, lens, columns)
+   !> Find the parts of the weight that the division by a power of L adds.
+   pure subroutine find_parts_of_weight(n, measure, work, columns)
       integer(ip), intent(in) :: n
+      type(overlap_measure_t), intent(in) :: measure
+      type(work_t), intent(inout) :: work
+      type(overlap_columns_t), intent(inout) :: columns
+      real(wp) :: mxx, mxy, myy, safe, root, area, size, polar, hz
+      integer(ip) :: i
+
+      if (.not. measure%power > 0.0_wp) then
+         work%even(:n) = 0.0_wp
+         work%polar(:n) = 0.0_wp
+         columns%length_square(:n) = 0.0_wp
+         return
+      end if
+      do i = 1_ip, n
+         mxx = work%second(i, 1, 1) + work%second(i, 1, 2)
+         mxy = work%second(i, 2, 1) + work%second(i, 2, 2)
+         myy = work%second(i, 3, 1) + work%second(i, 3, 2)
+         safe = max(mxx*myy - mxy*mxy, least_determinant)
+         root = sqrt(12.0_wp*sqrt(safe))
+         area = max(0.5_wp*(work%fan(i, 1, 1) + work%fan(i, 1, 2)), 0.25_wp)
+         hz = work%unit_area(i)*(work%unit_area(i)/work%square(i))
+         polar = max(work%square(i)*mxx + hz*myy, least_polar*work%square(i))
+         size = measure%share_effective*root + (1.0_wp - measure%share_effective)*area
+         work%even(i) = ((1.0_wp - measure%share_effective) + 0.5_wp*measure%power)*(size/area)
+         ! The form has the unit root/(4 determinant).
+         work%polar(i) = (2.0_wp*measure%power)*(size*safe)/(root*polar)
+         columns%length_square(i) = 12.0_wp*(polar/area)
+      end do
+   end subroutine find_parts_of_weight
+
+   !> Compute the results from the moments.
+   pure subroutine weigh(n, share, work, lens, columns)
+      integer(ip), intent(in) :: n
+      !> Share of the effective area in the measure, 1 or 0
+      real(wp), intent(in) :: share
       type(work_t), intent(in) :: work
       type(lens_work_t), intent(inout) :: lens
       type(overlap_columns_t), intent(inout) :: columns
-      real(wp) :: zx, zy, zz, h, cx, cy, mxx, mxy, myy, dxx, dxy, dyy, fx, fy
-      real(wp) :: determinant, product, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
+      real(wp) :: zx, zy, zz, h, cx, cy, mxx, mxy, myy, dxx, dxy, dyy, fx, fy, kxx, kxy, kyy
+      real(wp) :: determinant, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
       integer(ip) :: i
 
       do i = 1_ip, n
@@ -201,7 +250,6 @@ contains
          mxy = work%second(i, 2, 1) + work%second(i, 2, 2)
          myy = work%second(i, 3, 1) + work%second(i, 3, 2)
          determinant = mxx*myy - mxy*mxy
-         product = mxx*myy
          safe = max(determinant, least_determinant)
          root = sqrt(12.0_wp*sqrt(safe))
          unit = root/(24.0_wp*safe)
@@ -214,16 +262,19 @@ contains
          dxx = 0.5_wp*(work%second(i, 1, 1) - work%second(i, 1, 2)) - cy*(0.25_wp*twelfth + 0.25_wp*cx*cx)
          dxy = 0.5_wp*(work%second(i, 2, 1) - work%second(i, 2, 2)) - 0.25_wp*cx*cy*cy
          dyy = 0.5_wp*(work%second(i, 3, 1) - work%second(i, 3, 2)) - 0.25_wp*cy*cy*cy
-         ! Six times the mean of the form L on the chord, and half its derivative along the chord at the middle
-         on_chord = 0.5_wp*myy + 6.0_wp*((myy*cx*cx + mxx*cy*cy) - 2.0_wp*mxy*cx*cy)
-         slope = myy*cx - mxy*cy
-         along = 12.0_wp*unit*(h/zz)*(myy*fx - mxy*fy)
-         across = unit*(on_chord - 12.0_wp*(mxx*fy - mxy*fx))
-         turn = unit*(zz*((cx*on_chord + slope) + 12.0_wp*(mxx*dxy - mxy*dxx)) &
-                      - 12.0_wp*(h*(h/zz))*(myy*dxy - mxy*dyy))
+         ! Quadratic form of the weight, six times its mean on the chord, and half its slope along it at the middle
+         kxx = share*myy - work%polar(i)*zz
+         kxy = share*mxy
+         kyy = share*mxx - work%polar(i)*(h*(h/zz))
+         on_chord = 0.5_wp*kxx + 6.0_wp*((kxx*cx*cx + kyy*cy*cy) - 2.0_wp*kxy*cx*cy)
+         slope = kxx*cx - kxy*cy
+         along = 12.0_wp*unit*(h/zz)*(kxx*fx - kxy*fy)
+         across = unit*(on_chord - 12.0_wp*(kyy*fy - kxy*fx)) + work%even(i)
+         turn = unit*(zz*((cx*on_chord + slope) + 12.0_wp*share*(mxx*dxy - mxy*dxx)) &
+                      - 12.0_wp*share*(h*(h/zz))*(myy*dxy - mxy*dyy)) + work%even(i)*(zz*cx)
          gx = (0.5_wp*(lens%crossing(i, 1, 1) + lens%crossing(i, 1, 2)) + cx*zx) - (h/zz)*cy*zy
          gy = (0.5_wp*(lens%crossing(i, 2, 1) + lens%crossing(i, 2, 2)) + cx*zy) + (h/zz)*cy*zx
-         columns%area(i) = h*root
+         columns%area(i) = h*(share*root) + (1.0_wp - share)*area
          columns%normal(i, 1) = across*zy + along*zx
          columns%normal(i, 2) = along*zy - across*zx
          columns%length(i) = sqrt(columns%normal(i, 1)*columns%normal(i, 1) + columns%normal(i, 2)*columns%normal(i, 2))
@@ -233,13 +284,24 @@ contains
          columns%arm_second(i, 2) = gy - lens%centre(i, 4)
          columns%moment(i, 1) = turn + cross(columns%arm_first(i, :), columns%normal(i, :))
          columns%moment(i, 2) = turn + cross(columns%arm_second(i, :), columns%normal(i, :))
-         worst = min(zz - 4.0_wp*no_length**2*area, &
-                     columns%length(i)*columns%length(i) - 4.0_wp*no_length**2*columns%area(i))
-         worst = min(worst, min(determinant - least_determinant, determinant - least_ratio*product))
-         worst = min(worst, area - sure_area*lens%radius(i, 1)*lens%radius(i, 1))
+         worst = certificate(zz, area, columns%length(i), columns%area(i), determinant, mxx*myy, lens%radius(i, 1))
          lens%certified(i) = min(lens%certified(i), worst)
       end do
    end subroutine weigh
+
+   !> Positive if chord, area, contact length and moments of a lens are beyond their rounding errors
+   pure real(wp) function certificate(square, area, length, measured, determinant, product, radius)
+      !> Square of the chord, area, contact length and measure
+      real(wp), intent(in) :: square, area, length, measured
+      !> Determinant of the moments, and product of both
+      real(wp), intent(in) :: determinant, product
+      !> Radius of P
+      real(wp), intent(in) :: radius
+
+      certificate = min(square - 4.0_wp*no_length**2*area, length*length - 4.0_wp*no_length**2*measured)
+      certificate = min(certificate, min(determinant - least_determinant, determinant - least_ratio*product))
+      certificate = min(certificate, area - sure_area*radius*radius)
+   end function certificate
 
    !> Cross product of two vectors
    pure real(wp) function cross(a, b)

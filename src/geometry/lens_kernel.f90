@@ -30,6 +30,7 @@ module polydem_lens_kernel
    use polydem_lens_effective_area, only: integrate_effective_area
    use polydem_lens_work, only: centre_of, cross, edge, from_centre, lens_work_t, placed
    use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_overlap_tolerances, only: far, sure_at_edge, sure_in_fan
    use polydem_feature_cache, only: lens_bits, most_lens_corners
    implicit none
@@ -44,14 +45,14 @@ module polydem_lens_kernel
 contains
 
    !> Evaluate the first lanes of a batch.
-   pure subroutine evaluate_batch(batch, n, turned, effective, columns)
+   pure subroutine evaluate_batch(batch, n, turned, measure, columns)
       type(overlap_batch_t), intent(inout) :: batch
       !> Number of lanes
       integer(ip), intent(in) :: n
       !> Vertices of all polygons, anticlockwise, each relative to its own centre, (2, n) [m]
       real(wp), intent(in), contiguous :: turned(:, :)
-      !> Whether to compute the effective area (see `polydem_effective_area`) instead of the area
-      logical, intent(in) :: effective
+      !> How the overlaps are measured
+      type(overlap_measure_t), intent(in) :: measure
       !> The overlaps; these lanes are written
       type(overlap_columns_t), intent(inout) :: columns
       type(lens_work_t) :: lens
@@ -62,8 +63,8 @@ contains
       call find_crossings(n, lens)
       call test_corners(n, lens)
       call test_rare(lens)
-      if (effective) then
-         call integrate_effective_area(n, lens, columns)
+      if (measure%has_moments) then
+         call integrate_effective_area(n, measure, lens, columns)
       else
          call integrate_area(n, lens, columns)
       end if

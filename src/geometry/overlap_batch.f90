@@ -17,10 +17,10 @@ module polydem_overlap_batch
 
    !> Overlaps of a batch of pairs, one lane each. Its numbers are not initialised.
    type :: overlap_columns_t
-      !> Area of the overlap, true or effective [m2]
+      !> Area of the overlap, true or effective (see `polydem_overlap_measure`) [m2]
       real(wp) :: area(lanes)
-      !> Integral of the outward normal of P over its outline inside Q, (lane, x or y); weighted for the effective area
-      !> [m]. It is the gradient of the area
+      !> Integral of the outward normal of P over its outline inside Q, (lane, x or y), with the weight of the measure
+      !> [m]. Without division by a length it is the gradient of the area
       real(wp) :: normal(lanes, 2)
       !> Moments of that integral about the centres of P and of Q, (lane, body) [m2]
       real(wp) :: moment(lanes, 2)
@@ -28,6 +28,8 @@ module polydem_overlap_batch
       real(wp) :: arm_first(lanes, 2), arm_second(lanes, 2)
       !> Length |normal| [m]
       real(wp) :: length(lanes)
+      !> Square L^2 of the length of the overlap; 0 if the measure does not contain it [m2]
+      real(wp) :: length_square(lanes)
    end type overlap_columns_t
 
    !> A batch of pairs, one lane each. Its numbers are not initialised. Last indices (2) are P and Q.

@@ -18,18 +18,21 @@ module polydem_overlap_integrals
 
    !> Overlap of two polygons a and b
    type :: overlap_t
-      !> Area, 0 if the polygons are apart or touch; on request the effective area [m2]
+      !> Area, 0 if the polygons are apart or touch, or the effective area (see `polydem_overlap_measure`) [m2]
       real(wp) :: area = 0.0_wp
       !> Centroid relative to the centre of a [m]
       real(wp) :: centroid(2) = 0.0_wp
       !> Centroid relative to the centre of b [m]
       real(wp) :: centroid_b(2) = 0.0_wp
-      !> Integral of the outward normal of a over its outline inside b, the gradient of the area [m]
+      !> Integral of the outward normal of a over its outline inside b, with the weight of the measure; without division
+      !> by a length it is the gradient of the area [m]
       real(wp) :: normal(2) = 0.0_wp
       !> Moment of that integral about the centre of a [m2]
       real(wp) :: moment_a = 0.0_wp
       !> Moment of that integral about the centre of b [m2]
       real(wp) :: moment_b = 0.0_wp
+      !> Square L^2 of the length of the overlap; 0 if the measure does not contain it [m2]
+      real(wp) :: length_square = 0.0_wp
       !> Edge whose line separates the polygons: +k of a, -k of b; 0 if none is known or they overlap
       integer(ip) :: separating_edge = 0_ip
    end type overlap_t

@@ -2,6 +2,7 @@
 module polydem_piece_properties
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, wp
+   use polydem_overlap_measure, only: true_area
    use polydem_polygon, only: clean_polygon, greatest_radius, mass_properties
    use polydem_strings, only: to_text
    implicit none
@@ -94,7 +95,7 @@ contains
          a = joined(:, ends(i - 1_ip) + 1_ip:ends(i)) - spread(centres(:, i), 2, ends(i) - ends(i - 1_ip))
          b = joined(:, ends(j - 1_ip) + 1_ip:ends(j)) - spread(centres(:, j), 2, ends(j) - ends(j - 1_ip))
          rejected = 0_ip
-         call find_overlap(a, b, centres(:, j) - centres(:, i), greatest_radius(a), greatest_radius(b), .false., &
+         call find_overlap(a, b, centres(:, j) - centres(:, i), greatest_radius(a), greatest_radius(b), true_area, &
                            overlap, features, rejected)
          common = overlap%area
       end function overlap_of

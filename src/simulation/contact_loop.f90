@@ -134,7 +134,7 @@ contains
       do while (next > ends(1))
          call own_clock%begin_block()
          associate (pairs => self%search%neighbours%pairs)
-            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, &
+            call fill_block(self%bodies, pairs%first, pairs%second, self%law%overlap_measure, &
                             ends(1) + 1_ip, next, tested, self%history, block)
          end associate
          call own_clock%end_part(1)

@@ -243,7 +243,7 @@ contains
             mine%features(:n) = 0_ip
          end if
          do while (next >= 1_ip)
-            call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, 1_ip, next, tested, mine, &
+            call fill_block(bodies, first(:n), second(:n), law%overlap_measure, 1_ip, next, tested, mine, &
                          block)
             call law%apply_elastic(bodies, block, mine)
             do c = 1_ip, block%n

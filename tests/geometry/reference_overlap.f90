@@ -15,6 +15,7 @@ module reference_overlap
    use polydem_exact_cross, only: exact_cross
    use polydem_kinds, only: ip, wp
    use polydem_overlap_integrals, only: integrate_loop, overlap_t
+   use polydem_overlap_measure, only: overlap_measure_t, true_area
    implicit none
    private
    public :: reference_polygons
@@ -33,7 +34,7 @@ contains
    !> Overlap of two convex polygons.
    !>
    !> Complexity: O(n m) at worst for n and m vertices; O(n) or O(m) if `separating_edge` still separates them.
-   pure subroutine reference_polygons(a, b, offset, separating_edge, overlap, effective)
+   pure subroutine reference_polygons(a, b, offset, separating_edge, overlap, measured)
       !> Vertices of the first polygon, anticlockwise, relative to its centre, which is inside, (2, n) [m]
       real(wp), intent(in), contiguous :: a(:, :)
       !> Vertices of the second polygon, anticlockwise, relative to its own centre, (2, m) [m]
@@ -44,14 +45,14 @@ contains
       integer(ip), intent(in) :: separating_edge
       !> The overlap
       type(overlap_t), intent(out) :: overlap
-      !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`); default: no
-      logical, intent(in), optional :: effective
+      !> How the overlap is measured; default: by its true area
+      type(overlap_measure_t), intent(in), optional :: measured
       real(wp) :: reach_a, reach_b, scale
       integer(ip) :: edge
-      logical :: by_shape
+      type(overlap_measure_t) :: by
 
-      by_shape = .false.
-      if (present(effective)) by_shape = effective
+      by = true_area
+      if (present(measured)) by = measured
 
       reach_a = reach(a)
       reach_b = reach(b)
@@ -64,12 +65,12 @@ contains
       end if
 
       if (reach_a <= reach_b) then
-         call clip(a, b, offset, scale, by_shape, overlap)
+         call clip(a, b, offset, scale, by, overlap)
          overlap%normal = -overlap%normal
          overlap%moment_a = -overlap%moment_a
          overlap%moment_b = -overlap%moment_b
       else
-         call clip(b, a, -offset, scale, by_shape, overlap)
+         call clip(b, a, -offset, scale, by, overlap)
          call swap(overlap%moment_a, overlap%moment_b)
          overlap%centroid = overlap%centroid + offset
       end if
@@ -160,15 +161,15 @@ contains
    !>
    !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
    !> the subject's centre, `moment_b` about the clipper's.
-   pure subroutine clip(subject, clipper, offset, scale, by_shape, overlap)
+   pure subroutine clip(subject, clipper, offset, scale, by, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       !> Centre of the clipper minus centre of the subject
       real(wp), intent(in) :: offset(2)
       !> Size of the subject
       real(wp), intent(in) :: scale
-      !> Whether to compute the effective area
-      logical, intent(in) :: by_shape
+      !> How the overlap is measured
+      type(overlap_measure_t), intent(in) :: by
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(usual_corners, 2, 2), work(usual_corners, 2)
       logical :: on_clipper(usual_corners, 2)
@@ -177,35 +178,35 @@ contains
       ! Each edge of the clipper adds at most one vertex.
       corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
       if (corners <= usual_corners) then
-         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, work, &
+         call clip_in(subject, clipper, offset, scale, by, usual_corners, vertex, on_clipper, work, &
                       overlap)
       else
-         call clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
+         call clip_many(subject, clipper, offset, scale, by, corners, overlap)
       end if
    end subroutine clip
 
    !> As `clip`, with work arrays for `corners` vertices
-   pure subroutine clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
+   pure subroutine clip_many(subject, clipper, offset, scale, by, corners, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: scale
-      logical, intent(in) :: by_shape
+      type(overlap_measure_t), intent(in) :: by
       integer(ip), intent(in) :: corners
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(corners, 2, 2), work(corners, 2)
       logical :: on_clipper(corners, 2)
 
-      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
+      call clip_in(subject, clipper, offset, scale, by, corners, vertex, on_clipper, work, overlap)
    end subroutine clip_many
 
    !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
-   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
+   pure subroutine clip_in(subject, clipper, offset, scale, by, corners, vertex, on_clipper, work, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: scale
-      logical, intent(in) :: by_shape
+      type(overlap_measure_t), intent(in) :: by
       !> Capacity of the arrays, in vertices
       integer(ip), intent(in) :: corners
       !> Vertices (corner, x or y, loop)
@@ -243,8 +244,9 @@ contains
          k = merge(1_ip, k + 1_ip, k == m)
       end do
       call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
-      if (.not. (by_shape .and. overlap%area > 0.0_wp)) return
-      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, vertex(:, :, 3_ip - now), overlap)
+      if (.not. (by%has_moments .and. overlap%area > 0.0_wp)) return
+      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, by, vertex(:, :, 3_ip - now), &
+                          overlap)
    end subroutine clip_in
 
    !> Depth of the subject's centre below all edges of the clipper

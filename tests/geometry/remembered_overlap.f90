@@ -6,12 +6,13 @@ module remembered_overlap
    use polydem_kinds, only: ip, lp, wp
    use polydem_lens_kernel_base, only: evaluate_batch
    use polydem_overlap_batch, only: add_lane, lanes, overlap_batch_t, overlap_columns_t
+   use polydem_overlap_measure, only: effective_area, overlap_measure_t, true_area
    use polydem_random, only: random_t
    use polydem_separation, only: test_edges
    implicit none
    private
    public :: pair_t, overlap_with_memory, separated_by, certified_lens, same_bits, radius_of
-   public :: random_pair, grid_pair, any_integer, n_kinds
+   public :: random_pair, grid_pair, any_integer, n_kinds, measure_of
 
    !> Kinds of random pairs
    integer, parameter :: n_kinds = 8
@@ -26,12 +27,22 @@ module remembered_overlap
 
 contains
 
+   !> Every measure of overlaps in turn
+   pure type(overlap_measure_t) function measure_of(k)
+      integer, intent(in) :: k
+      type(overlap_measure_t), parameter :: all_measures(0:4) = [ &
+         true_area, effective_area, overlap_measure_t(.true., 1.0_wp, 0.5_wp), overlap_measure_t(.true., 0.0_wp, 1.0_wp), &
+         overlap_measure_t(.true., 1.0_wp, 1.0_wp)]
+
+      measure_of = all_measures(modulo(k, size(all_measures)))
+   end function measure_of
+
    !> Overlap of a pair from what is remembered; `features` becomes what the next step remembers, as in `fill_block`
-   subroutine overlap_with_memory(pair, effective, features, overlap)
+   subroutine overlap_with_memory(pair, measure, features, overlap)
       !> The pair, P first
       type(pair_t), intent(in) :: pair
-      !> Whether to compute the effective area
-      logical, intent(in) :: effective
+      !> How the overlap is measured
+      type(overlap_measure_t), intent(in) :: measure
       !> Any integer
       integer(ip), intent(inout) :: features
       !> The overlap
@@ -41,10 +52,10 @@ contains
 
       call separated_by(pair, features, done)
       if (done) return
-      call certified_lens(pair, effective, features, overlap, done)
+      call certified_lens(pair, measure, features, overlap, done)
       if (done) return
       rejected = max(0_ip, features)
-      call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), effective, overlap, &
+      call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), measure, overlap, &
                         features, rejected)
       if (features == 0_ip) features = rejected
    end subroutine overlap_with_memory
@@ -82,11 +93,11 @@ contains
    end function vertices_of
 
    !> Overlap of a pair if a remembered lens is certified
-   subroutine certified_lens(pair, effective, features, overlap, certified)
+   subroutine certified_lens(pair, measure, features, overlap, certified)
       !> The pair, P first
       type(pair_t), intent(in) :: pair
-      !> Whether to compute the effective area
-      logical, intent(in) :: effective
+      !> How the overlap is measured
+      type(overlap_measure_t), intent(in) :: measure
       !> Any integer
       integer(ip), intent(in) :: features
       !> The overlap; zero if it is not certified
@@ -101,7 +112,7 @@ contains
       m = size(pair%q, 2, kind=ip)
       call add_lane(batch, 1_ip, features, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), &
                     radius_of(pair%q))
-      call evaluate_batch(batch, 1_ip, vertices_of(pair), effective, columns)
+      call evaluate_batch(batch, 1_ip, vertices_of(pair), measure, columns)
       certified = batch%certified(1) > 0.0_wp
       if (.not. certified) return
       overlap%area = columns%area(1)
@@ -110,6 +121,7 @@ contains
       overlap%normal = columns%normal(1, :)
       overlap%moment_a = columns%moment(1, 1)
       overlap%moment_b = columns%moment(1, 2)
+      overlap%length_square = columns%length_square(1)
    end subroutine certified_lens
 
    !> Whether two overlaps are equal
@@ -125,10 +137,10 @@ contains
    !> All numbers of an overlap
    pure function numbers(overlap)
       type(overlap_t), intent(in) :: overlap
-      real(wp) :: numbers(9)
+      real(wp) :: numbers(10)
 
       numbers = [overlap%area, overlap%centroid, overlap%centroid_b, overlap%normal, overlap%moment_a, &
-                 overlap%moment_b]
+                 overlap%moment_b, overlap%length_square]
    end function numbers
 
    !> Greatest distance of a vertex from the centre

@@ -55,7 +55,7 @@ contains
       settings%friction = 'none'
       if (present(cohesion)) settings%cohesion = cohesion
       call new_force_law(settings, pair%bodies, pair%law)
-      pair%contacts%area_is_effective = pair%law%needs_effective_area
+      pair%contacts%measure = pair%law%overlap_measure
       pair%contacts%has_cohesion = pair%law%needs_cohesion
    end subroutine new_pair
 

@@ -133,6 +133,7 @@ contains
          block%normal(b, :) = side*contacts%normal(:, c)
          block%direction(b, :) = side*contacts%direction(:, c)
          block%length(b) = contacts%length(c)
+         block%length_square(b) = contacts%length_square(c)
          block%degenerate(b) = merge(1.0_wp, 0.0_wp, is_degenerate(contacts, c))
          block%inverse_length(b) = contacts%inverse_length(c)
          block%lever(b) = side*contacts%lever(c)
@@ -191,6 +192,7 @@ contains
       contacts%normal(:, c) = side*block%normal(b, :)
       contacts%direction(:, c) = side*block%direction(b, :)
       contacts%length(c) = block%length(b)
+      contacts%length_square(c) = block%length_square(b)
    end subroutine store_contact
 
 end module polydem_contact_block

@@ -6,6 +6,7 @@
 module polydem_contacts
    use polydem_grow, only: grow
    use polydem_kinds, only: ip, wp
+   use polydem_overlap_measure, only: overlap_measure_t
    implicit none
    private
    public :: contacts_t, reserve_contacts, grow_contacts, copy_contact, contact_force, is_degenerate
@@ -18,9 +19,9 @@ module polydem_contacts
       integer(ip) :: n_degenerate = 0_ip
       !> Whether the elastic force has an energy, elastic*area/(2 length), and cohesion has cohesion*area/length
       logical :: energy_is_known = .false.
-      !> Whether `area` and the columns derived from it (`rate`, `normal`, `moment`, `direction`, `length`) are those of
-      !> the effective area (see `polydem_effective_area`)
-      logical :: area_is_effective = .false.
+      !> How overlaps are measured: `area` and the columns derived from it (`rate`, `normal`, `moment`, `direction`,
+      !> `length`) are those of this measure
+      type(overlap_measure_t) :: measure
       !> Whether a force part needs the column `cohesion`
       logical :: has_cohesion = .false.
       !> Whether a force part needs the column `twist`
@@ -31,12 +32,12 @@ module polydem_contacts
       integer(ip), allocatable :: first(:)
       !> Slot of the body with the higher identifier
       integer(ip), allocatable :: second(:)
-      !> Area of the overlap, true or effective [m2]
+      !> Area of the overlap, true or effective (see `polydem_overlap_measure`) [m2]
       real(wp), allocatable :: area(:)
       !> Rate of change of the area, exact from positions and velocities [m2/s]
       real(wp), allocatable :: rate(:)
-      !> Integral of the outward normal over the outline of the first body inside the second, weighted if the area is
-      !> effective, (2, contact) [m]
+      !> Integral of the outward normal over the outline of the first body inside the second, with the weight of the
+      !> measure, (2, contact) [m]
       real(wp), allocatable :: normal(:, :)
       !> Moment of that integral about the centres of the first and of the second body, (2, contact) [m2]
       real(wp), allocatable :: moment(:, :)
@@ -48,6 +49,8 @@ module polydem_contacts
       real(wp), allocatable :: direction(:, :)
       !> Length of the contact |normal|, or the square root of the area if degenerate [m]
       real(wp), allocatable :: length(:)
+      !> Square of the length of the overlap; 0 if the measure does not contain it [m2]
+      real(wp), allocatable :: length_square(:)
       !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
       !> materials to that of the law if materials differ [1/m]
       real(wp), allocatable :: inverse_length(:)
@@ -117,6 +120,7 @@ contains
       call grow(contacts%arm_second, kept, m, 0.0_wp)
       call grow(contacts%direction, kept, m, 0.0_wp)
       call grow(contacts%length, kept, m, 0.0_wp)
+      call grow(contacts%length_square, kept, m, 0.0_wp)
       call grow(contacts%inverse_length, kept, m, 0.0_wp)
       call grow(contacts%lever, kept, m, 0.0_wp)
       call grow(contacts%elastic, kept, m, 0.0_wp)
@@ -148,6 +152,7 @@ contains
       to%arm_second(:, d) = from%arm_second(:, c)
       to%direction(:, d) = from%direction(:, c)
       to%length(d) = from%length(c)
+      to%length_square(d) = from%length_square(c)
       to%inverse_length(d) = from%inverse_length(c)
       to%lever(d) = from%lever(c)
       to%elastic(d) = from%elastic(c)

@@ -10,6 +10,7 @@ module polydem_force_law
    use polydem_errors, only: error_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic, stage_on_damping
    use polydem_kinds, only: ip, wp
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_pair_parameters, only: pair_parameters_t, uniform_parameters
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_velocity_constraint, only: velocity_constraint_t
@@ -32,8 +33,8 @@ module polydem_force_law
       class(velocity_constraint_t), allocatable :: constraint
       !> First columns of the contact history, in this order; not allocated before `choose_parts`
       type(history_kind_t), allocatable :: history_kinds(:)
-      !> Whether the law needs the effective area of overlaps
-      logical :: needs_effective_area = .false.
+      !> How the law measures overlaps
+      type(overlap_measure_t) :: overlap_measure
       !> Whether a part adds to the column `cohesion`
       logical :: needs_cohesion = .false.
       !> Whether a part adds to the column `twist`
@@ -116,7 +117,7 @@ contains
       law%description = ''
       do k = 1, size(law%parts)
          associate (part => law%parts(k)%part)
-            law%needs_effective_area = law%needs_effective_area .or. part%needs_effective_area
+            if (part%stage == stage_elastic) law%overlap_measure = part%overlap_measure
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist
             law%needs_shares = law%needs_shares .or. part%needs_shares
@@ -137,7 +138,8 @@ contains
       end if
       do k = 1, size(law%parts)
          associate (part => law%parts(k)%part)
-            if (part%needs_cohesion .and. .not. part%cohesion_has_energy) law%energy_is_known = .false.
+            if (part%needs_cohesion .and. (.not. part%cohesion_has_energy .or. law%overlap_measure%power > 0.0_wp)) &
+               law%energy_is_known = .false.
          end associate
       end do
       law%description = trim(adjustl(law%description))
@@ -290,7 +292,11 @@ contains
             is_weak = is_weak .or. (part%dissipates .and. part%is_weak)
          end associate
       end do
-      if (.not. law%energy_is_known) note = note//', the area law gains energy where slender bodies rock'
+      if (.not. law%overlap_measure%has_moments) then
+         note = note//', the area law gains energy where slender bodies rock'
+      else if (.not. law%energy_is_known) then
+         note = note//', cohesion has no potential with this law'
+      end if
       if (.not. damps) note = note//', nothing is damped'
       if (damps .and. is_weak) note = note//', damping is weak'
       if (damps .and. .not. damps_tilts) note = note//', tilts are not damped'

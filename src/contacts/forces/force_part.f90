@@ -18,6 +18,7 @@ module polydem_force_part
    use polydem_contact_block, only: contact_block_t
    use polydem_kinds, only: ip, wp
    use polydem_law_part, only: law_part_t
+   use polydem_overlap_measure, only: overlap_measure_t
    implicit none
    private
    public :: force_part_t, resting_block_t, stage_elastic, stage_damping, stage_on_damping, stage_normal, stage_last
@@ -45,8 +46,8 @@ module polydem_force_part
    type, abstract, extends(law_part_t) :: force_part_t
       !> Stage in which it acts, one of the constants above
       integer :: stage = stage_normal
-      !> Whether `area` and the derived columns must be those of the effective area
-      logical :: needs_effective_area = .false.
+      !> How overlaps must be measured; that of the elastic part counts
+      type(overlap_measure_t) :: overlap_measure
       !> Whether it adds to the column `cohesion`, and whether the energy of this attraction is cohesion*area/length
       logical :: needs_cohesion = .false., cohesion_has_energy = .false.
       !> Whether it adds to the column `twist`

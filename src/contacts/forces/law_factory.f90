@@ -53,6 +53,9 @@ contains
       associate (s => settings)
          if (s%law == 'area') call law%add(area_law_t(name='area law'), s)
          if (s%law == 'conservative') call law%add(conservative_law_t(name='conservative law'), s)
+         if (s%law == 'own_length') call law%add(conservative_law_t(name='law of the own length'), s)
+         if (s%law == 'polar') call law%add(conservative_law_t(name='polar law'), s)
+         if (s%law == 'effective_polar') call law%add(conservative_law_t(name='effective polar law'), s)
          if (s%damping == 'rate') then
             if (s%restitution > 0.0_wp) then
                call law%add(restitution_damping_t(name='damping of given restitution'), s)

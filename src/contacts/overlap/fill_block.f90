@@ -22,6 +22,7 @@ module polydem_fill_block
    use polydem_evaluate_batch, only: evaluate_batch
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: overlap_batch_t
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_overlap_tolerances, only: no_length
    use polydem_piece_contacts, only: keep_pieces, refer_to_bodies, take_bodies
    use polydem_separation, only: test_edges
@@ -41,13 +42,13 @@ module polydem_fill_block
 contains
 
    !> Fill a block with contacts of pairs in descending order.
-   subroutine fill_block(bodies, first, second, effective, low, next, tested, history, block)
+   subroutine fill_block(bodies, first, second, measure, low, next, tested, history, block)
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
       !> Lower and higher piece of each pair
       integer(ip), intent(in), contiguous :: first(:), second(:)
-      !> Whether to compute the effective area
-      logical, intent(in) :: effective
+      !> How the overlaps are measured
+      type(overlap_measure_t), intent(in) :: measure
       !> Last pair to examine
       integer(ip), intent(in) :: low
       !> First pair to examine, at least `low`; afterwards the next one, less than `low` if there is none
@@ -63,10 +64,10 @@ contains
 
       at = place_t(low, next, tested)
       if (bodies%pieces%most == 1_ip) then
-         call fill(bodies, bodies%radius, bodies%pieces%vertex_start, bodies%pieces%turned, first, second, effective, &
+         call fill(bodies, bodies%radius, bodies%pieces%vertex_start, bodies%pieces%turned, first, second, measure, &
                    at, history, block)
       else
-         call fill(bodies, bodies%pieces%radius, bodies%pieces%start, bodies%pieces%outline, first, second, effective, &
+         call fill(bodies, bodies%pieces%radius, bodies%pieces%start, bodies%pieces%outline, first, second, measure, &
                    at, history, block)
       end if
       next = at%next
@@ -74,7 +75,7 @@ contains
    end subroutine fill_block
 
    !> Fill a block with contacts of the pairs of some polygons.
-   subroutine fill(bodies, radius, start, outline, first, second, effective, at, history, block)
+   subroutine fill(bodies, radius, start, outline, first, second, measure, at, history, block)
       type(bodies_t), intent(in) :: bodies
       !> Greatest distance of a vertex from the centre of each polygon [m]
       real(wp), intent(in), contiguous :: radius(:)
@@ -83,7 +84,7 @@ contains
       !> Turned vertices, relative to the centre of their polygon, (2, vertex) [m]
       real(wp), intent(in), contiguous :: outline(:, :)
       integer(ip), intent(in), contiguous :: first(:), second(:)
-      logical, intent(in) :: effective
+      type(overlap_measure_t), intent(in) :: measure
       type(place_t), intent(inout) :: at
       type(contact_history_t), intent(inout) :: history
       type(contact_block_t), intent(inout) :: block
@@ -94,11 +95,11 @@ contains
       call select_pairs(bodies, radius, start, outline, first, second, at, history, block, batch)
       call describe_pairs(bodies, block%n, block%pair, first, second, radius, start, block%first, block%second, batch)
       if (is_compound) call take_bodies(bodies%pieces, block)
-      call evaluate_batch(batch, block%n, outline, effective, bodies%isa, block%overlap_columns_t)
+      call evaluate_batch(batch, block%n, outline, measure, bodies%isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
       if (.not. all_certified) &
-         call search_others(bodies, radius, start, outline, effective, batch%certified, history, block)
+         call search_others(bodies, radius, start, outline, measure, batch%certified, history, block)
       if (is_compound) call refer_to_bodies(bodies, block)
       call copy_motion(bodies, block)
       if (bodies%cell%is_sheared) call add_jumps(bodies, block)
@@ -197,12 +198,12 @@ contains
    end subroutine select_in_range
 
    !> Search the overlaps of the pairs that are not certified, and remove those that are no contacts.
-   subroutine search_others(bodies, radius, start, outline, effective, certified, history, block)
+   subroutine search_others(bodies, radius, start, outline, measure, certified, history, block)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in), contiguous :: radius(:)
       integer(ip), intent(in), contiguous :: start(:)
       real(wp), intent(in), contiguous :: outline(:, :)
-      logical, intent(in) :: effective
+      type(overlap_measure_t), intent(in) :: measure
       real(wp), intent(in) :: certified(:)
       type(contact_history_t), intent(inout) :: history
       type(contact_block_t), intent(inout) :: block
@@ -212,7 +213,7 @@ contains
       do c = 1_ip, block%n
          exists(c) = certified(c) > 0.0_wp
          if (.not. exists(c)) &
-            call search(bodies, radius, start, outline, effective, c, history, block, exists(c))
+            call search(bodies, radius, start, outline, measure, c, history, block, exists(c))
       end do
       if (all(exists(:block%n))) return
       if (bodies%pieces%most > 1_ip) call keep_pieces(exists, block)
@@ -220,12 +221,12 @@ contains
    end subroutine search_others
 
    !> Search the overlap of one pair. What is remembered is no separating edge, and no lens that is certified.
-   subroutine search(bodies, radius, start, outline, effective, c, history, block, exists)
+   subroutine search(bodies, radius, start, outline, measure, c, history, block, exists)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in), contiguous :: radius(:)
       integer(ip), intent(in), contiguous :: start(:)
       real(wp), intent(in), contiguous :: outline(:, :)
-      logical, intent(in) :: effective
+      type(overlap_measure_t), intent(in) :: measure
       !> Index in the block
       integer(ip), intent(in) :: c
       type(contact_history_t), intent(inout) :: history
@@ -246,7 +247,7 @@ contains
       if (allocated(history%features)) rejected = max(0_ip, history%features(block%pair(c)))
       associate (p => block%pair(c))
          call find_overlap(outline(:, start(i):start(i + 1_ip) - 1_ip), outline(:, start(j):start(j + 1_ip) - 1_ip), &
-                           offset_of_contact(bodies, block, c), radius(i), radius(j), effective, overlap, features, &
+                           offset_of_contact(bodies, block, c), radius(i), radius(j), measure, overlap, features, &
                            rejected)
          if (allocated(history%features)) history%features(p) = merge(rejected, features, features == 0_ip)
          exists = overlap%area > 0.0_wp
@@ -261,6 +262,7 @@ contains
       block%area(c) = overlap%area
       block%normal(c, :) = overlap%normal
       block%length(c) = length_of(overlap%normal(1), overlap%normal(2))
+      block%length_square(c) = overlap%length_square
       block%moment(c, :) = [overlap%moment_a, overlap%moment_b]
       block%arm_first(c, :) = overlap%centroid
       block%arm_second(c, :) = overlap%centroid_b
@@ -284,6 +286,7 @@ contains
          block%area(b) = block%area(c)
          block%normal(b, :) = block%normal(c, :)
          block%length(b) = block%length(c)
+         block%length_square(b) = block%length_square(c)
          block%moment(b, :) = block%moment(c, :)
          block%arm_first(b, :) = block%arm_first(c, :)
          block%arm_second(b, :) = block%arm_second(c, :)

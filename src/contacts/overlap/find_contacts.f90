@@ -8,6 +8,7 @@ module polydem_find_contacts
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
    use polydem_kinds, only: dp, ip
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_pair_ranges, only: divide_pairs, most_ranges
    implicit none
    private
@@ -28,7 +29,7 @@ contains
       !> Contact history of the pairs: `features` is updated, and the other columns are cleared for pairs whose polygons
       !> do not overlap; any column may be absent
       type(contact_history_t), intent(inout) :: history
-      !> Contacts; `area_is_effective` must be set. The columns that the forces fill are not set
+      !> Contacts; `measure` must be set. The columns that the forces fill are not set
       type(contacts_t), intent(inout) :: contacts
       type(contact_rows_t) :: rows(most_ranges)
       integer(ip) :: ends(0:most_ranges)
@@ -41,7 +42,7 @@ contains
       !$omp    shared(bodies, first, second, history, contacts, rows, ends, n_ranges)
       do r = 1_ip, n_ranges
          call start_rows(contacts, 0_ip, rows(r))
-         call find_in_range(bodies, first, second, contacts%area_is_effective, ends(r - 1_ip:r), history, rows(r))
+         call find_in_range(bodies, first, second, contacts%measure, ends(r - 1_ip:r), history, rows(r))
       end do
       !$omp end parallel do
       call gather_rows(rows(:n_ranges), contacts)
@@ -52,10 +53,10 @@ contains
    end subroutine find_contacts
 
    !> Find the contacts of a range of pairs.
-   subroutine find_in_range(bodies, first, second, effective, ends, history, rows)
+   subroutine find_in_range(bodies, first, second, measure, ends, history, rows)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: first(:), second(:)
-      logical, intent(in) :: effective
+      type(overlap_measure_t), intent(in) :: measure
       !> Index of the last pair before the range, and of its last pair
       integer(ip), intent(in) :: ends(2)
       type(contact_history_t), intent(inout) :: history
@@ -66,7 +67,7 @@ contains
       next = ends(2)
       tested = next + 1_ip
       do while (next > ends(1))
-         call fill_block(bodies, first, second, effective, ends(1) + 1_ip, next, tested, history, block)
+         call fill_block(bodies, first, second, measure, ends(1) + 1_ip, next, tested, history, block)
          call append_rows(block, rows, with_forces=.false.)
       end do
    end subroutine find_in_range

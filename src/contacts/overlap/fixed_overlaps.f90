@@ -3,6 +3,7 @@ module polydem_fixed_overlaps
    use polydem_bodies, only: bodies_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, lp, wp
+   use polydem_overlap_measure, only: true_area
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
@@ -91,11 +92,11 @@ contains
             rejected = 0_ip
             if (bodies%pieces%most == 1_ip) then
                call find_overlap(bodies%pieces%turned_polygon(p), bodies%pieces%turned_polygon(q), offset, &
-                                 bodies%radius(p), bodies%radius(q), .false., overlap, features, rejected)
+                                 bodies%radius(p), bodies%radius(q), true_area, overlap, features, rejected)
             else
                call find_overlap(outline_of(bodies, a), outline_of(bodies, b), &
                                  offset + (bodies%pieces%arm(:, b) - bodies%pieces%arm(:, a)), &
-                                 bodies%pieces%radius(a), bodies%pieces%radius(b), .false., overlap, features, rejected)
+                                 bodies%pieces%radius(a), bodies%pieces%radius(b), true_area, overlap, features, rejected)
                overlap%centroid = overlap%centroid + bodies%pieces%arm(:, a)
             end if
             if (overlap%area > greatest%area) greatest = overlap

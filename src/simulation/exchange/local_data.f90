@@ -88,7 +88,7 @@ contains
       type(force_law_t), intent(in) :: law
       type(contacts_t), intent(out) :: contacts
 
-      contacts%area_is_effective = law%needs_effective_area
+      contacts%measure = law%overlap_measure
       contacts%energy_is_known = law%energy_is_known
       contacts%has_cohesion = law%needs_cohesion
       contacts%has_twist = law%needs_twist

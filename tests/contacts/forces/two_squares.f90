@@ -53,6 +53,7 @@ contains
       contacts%arm_second(:, 1) = [0.0_wp, -arm]
       contacts%direction(:, 1) = [0.0_wp, -1.0_wp]
       contacts%length(1) = width
+      contacts%length_square(1) = width**2 + depth**2
       contacts%lever(1) = 0.0_wp
       contacts%elastic(1) = 0.0_wp
       contacts%normal_force(1) = 0.0_wp

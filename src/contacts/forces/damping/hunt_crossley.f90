@@ -8,7 +8,7 @@ module polydem_hunt_crossley
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_kinds, only: ip, wp
-   use polydem_normal_damping, only: normal_damping_t
+   use polydem_normal_damping, only: find_reaches, normal_damping_t
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: weighted
    use polydem_settings, only: forces_settings_t
@@ -44,13 +44,13 @@ contains
       class(hunt_crossley_t), intent(in) :: self
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: force(block_size)
-      real(wp) :: share
+      real(wp) :: share, reach(block_size)
       integer(ip) :: c
 
+      call find_reaches(block, reach)
       do c = 1_ip, block%n
-         ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          share = self%coefficient%one*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))*block%inverse_length(c) &
-            *(block%rate(c)/max(block%length(c), sqrt(block%area(c))))
+            *(block%rate(c)/reach(c))
          force(c) = block%elastic(c)*share
       end do
    end subroutine find_forces
@@ -60,11 +60,13 @@ contains
       class(hunt_crossley_t), intent(in) :: self
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: dashpot(block_size)
+      real(wp) :: reach(block_size)
       integer(ip) :: c
 
+      call find_reaches(block, reach)
       do c = 1_ip, block%n
          dashpot(c) = block%elastic(c)*(self%coefficient%one*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))) &
-            *(block%inverse_length(c)*block%length(c)/max(block%length(c), sqrt(block%area(c))))
+            *(block%inverse_length(c)*block%length(c)/reach(c))
       end do
    end subroutine find_dashpots
 

@@ -14,7 +14,7 @@ module polydem_normal_damping
    use polydem_settings, only: forces_settings_t
    implicit none
    private
-   public :: normal_damping_t
+   public :: normal_damping_t, find_reaches
 
    !> A normal damping
    type, abstract, extends(force_part_t) :: normal_damping_t
@@ -113,6 +113,27 @@ contains
       element%normal_dashpot = element%normal_dashpot &
          + self%coefficient%of(element%materials)*sqrt(element%normal_mass*self%stiffness)*element%ratio
    end subroutine stiffen
+
+   !> Find the lengths by which rates of the area are divided, for their velocities. Bars that nearly cross turn without
+   !> approach, and their contact length vanishes. So these lengths are at least the side of a square of the same area,
+   !> or half the area over the length of the overlap, if the law knows it.
+   pure subroutine find_reaches(block, reach)
+      type(contact_block_t), intent(in) :: block
+      !> The lengths [m]
+      real(wp), intent(inout) :: reach(block_size)
+      integer(ip) :: c
+
+      if (block%n == 0_ip) return
+      if (block%length_square(1) > 0.0_wp) then
+         do c = 1_ip, block%n
+            reach(c) = max(block%length(c), 0.5_wp*block%area(c)/sqrt(block%length_square(c)))
+         end do
+      else
+         do c = 1_ip, block%n
+            reach(c) = max(block%length(c), sqrt(block%area(c)))
+         end do
+      end if
+   end subroutine find_reaches
 
    !> Copy stiffness and coefficient from the settings. Forces are in proportion to gamma sqrt(E).
    subroutine take_coefficients(self, settings, pairs)

@@ -17,7 +17,7 @@ module polydem_restitution_damping
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
-   use polydem_normal_damping, only: normal_damping_t
+   use polydem_normal_damping, only: find_reaches, normal_damping_t
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -61,14 +61,13 @@ contains
       class(restitution_damping_t), intent(in) :: self
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: force(block_size)
-      real(wp) :: reach
+      real(wp) :: reach(block_size)
       integer(ip) :: c
 
+      call find_reaches(block, reach)
       do c = 1_ip, block%n
-         ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
-         reach = max(block%length(c), sqrt(block%area(c)))
          force(c) = 2.0_wp*self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
-            *sqrt(block%inverse_length(c)/reach)*block%rate(c)*block%share_root(c)
+            *sqrt(block%inverse_length(c)/reach(c))*block%rate(c)*block%share_root(c)
       end do
    end subroutine find_forces
 
@@ -77,13 +76,13 @@ contains
       class(restitution_damping_t), intent(in) :: self
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: dashpot(block_size)
-      real(wp) :: reach
+      real(wp) :: reach(block_size)
       integer(ip) :: c
 
+      call find_reaches(block, reach)
       do c = 1_ip, block%n
-         reach = max(block%length(c), sqrt(block%area(c)))
          dashpot(c) = 2.0_wp*self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
-            *sqrt(block%inverse_length(c)/reach)*(block%length(c)*block%share_root(c))
+            *sqrt(block%inverse_length(c)/reach(c))*(block%length(c)*block%share_root(c))
       end do
    end subroutine find_dashpots
 
