@@ -48,7 +48,7 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("type(walk_settings_t) :: walk\n", settings_module(*table))
         self.assertIn("allocate (settings%dog(count(instances%group == 'dog')))", fill_module(*table))
         self.assertIn("call fill_dog(instances(k), settings%dog(instances(k)%number))", fill_module(*table))
-        self.assertIn("| &dog | `name` | name | | required | letters, digits, _ | | Name", manual(table[1]))
+        self.assertIn("| &dog | `name` | name | | required | at most 64 letters, digits, _ | | Name", manual(table[1]))
         self.assertIn("| &dog | `friends` | 2 names | | required | name of a &dog | | Other", manual(table[1]))
 
     def test_a_part_can_be_stored_back(self):
