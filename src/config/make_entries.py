@@ -231,7 +231,8 @@ def fill_module(groups, rows):
     uses = [f"settings, only: {group}_settings_t" for group in groups]
     used = f"group_instances, only: instance_t, row_of{', store_value' * bool(stores)}"
     return module("fill_groups", "Copies the values of the table of entries to the settings, and those of parts back.",
-                  [used, "settings, only: settings_t", *uses], ["fill_groups", f"fill_{BENCH}", "fill_motion", *stores], "",
+                  [used, "settings, only: settings_t", *uses],
+                  ["fill_groups", f"fill_{BENCH}", "fill_motion", *stores], "",
                   "\n".join(parts))
 
 

@@ -31,7 +31,8 @@ contains
    pure type(overlap_measure_t) function measure_of(k)
       integer, intent(in) :: k
       type(overlap_measure_t), parameter :: all_measures(0:4) = [ &
-         true_area, effective_area, overlap_measure_t(.true., 1.0_wp, 0.5_wp), overlap_measure_t(.true., 0.0_wp, 1.0_wp), &
+         true_area, effective_area, overlap_measure_t(.true., 1.0_wp, 0.5_wp), &
+         overlap_measure_t(.true., 0.0_wp, 1.0_wp), &
          overlap_measure_t(.true., 1.0_wp, 1.0_wp)]
 
       measure_of = all_measures(modulo(k, size(all_measures)))

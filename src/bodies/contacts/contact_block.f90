@@ -56,8 +56,8 @@ module polydem_contact_block
       real(wp) :: cohesion(block_size)
       !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
       real(wp) :: normal_force(block_size)
-      !> Square root of the share of the contact in the stiffness of all contacts between the same two bodies, where fixed
-      !> bodies count as one; set only if the force law needs shares [1]
+      !> Square root of the share of the contact in the stiffness of all contacts between the same two bodies, where
+      !> fixed bodies count as one; set only if the force law needs shares [1]
       real(wp) :: share_root(block_size)
       !> Normal damping force per normal velocity, before its limit; set only if tilts are damped [N s/m2]
       real(wp) :: dashpot(block_size)

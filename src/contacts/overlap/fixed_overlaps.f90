@@ -92,7 +92,8 @@ contains
             rejected = 0_ip
             if (bodies%pieces%most == 1_ip) then
                call find_overlap(bodies%pieces%turned_polygon(p), bodies%pieces%turned_polygon(q), offset, &
-                                 bodies%radius(p), bodies%radius(q), true_area, overlap, features, rejected)
+                                 bodies%radius(p), bodies%radius(q), true_area, overlap, &
+                                 features, rejected)
             else
                call find_overlap(outline_of(bodies, a), outline_of(bodies, b), &
                                  offset + (bodies%pieces%arm(:, b) - bodies%pieces%arm(:, a)), &
