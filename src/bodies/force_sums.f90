@@ -13,18 +13,18 @@ module polydem_force_sums
    use polydem_contact_block, only: block_size, contact_block_t, load_block
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
+   use polydem_term_list, only: append_term, n_terms, reserve_terms, term_list_t
    implicit none
    private
-   public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential, sum_x, sum_y
-   public :: sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of, reserve_terms
-   public :: append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
+   public :: force_sums_t, contact_terms_t, n_terms, of_elastic, of_normal, of_tangential, sum_x, sum_y
+   public :: sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of
+   public :: add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
    public :: energy_of_contact
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
    !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]
-   integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10, &
-      n_terms = 10
+   integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10
    !> Number of bodies in a group for late terms
    integer(ip), parameter :: group = 16_ip
 
@@ -49,16 +49,6 @@ module polydem_force_sums
       !> Rows of the second body from its torques on; its forces are opposite, (row, contact)
       real(wp) :: second(sum_torque(1):n_terms, block_size)
    end type contact_terms_t
-
-   !> A list of terms
-   type :: term_list_t
-      !> Number of terms
-      integer(ip) :: n = 0_ip
-      !> Slots of the body of each term and of its partner, (2, n) or longer
-      integer(ip), allocatable :: slots(:, :)
-      !> The terms, (n_terms, n) or longer
-      real(wp), allocatable :: term(:, :)
-   end type term_list_t
 
 contains
 
@@ -287,36 +277,6 @@ contains
          sums%has_terms(slots(1)) = .true.
       end if
    end subroutine add_or_keep
-
-   !> Make room for terms.
-   pure subroutine reserve_terms(n, list)
-      !> Number of terms in all
-      integer(ip), intent(in) :: n
-      type(term_list_t), intent(inout) :: list
-      integer(ip), allocatable :: slots(:, :)
-      real(wp), allocatable :: term(:, :)
-
-      if (.not. allocated(list%slots)) allocate (list%slots(2, 0), list%term(n_terms, 0))
-      if (n <= size(list%slots, 2)) return
-      allocate (slots(2, 2_ip*n), term(n_terms, 2_ip*n))
-      slots(:, :list%n) = list%slots(:, :list%n)
-      term(:, :list%n) = list%term(:, :list%n)
-      call move_alloc(slots, list%slots)
-      call move_alloc(term, list%term)
-   end subroutine reserve_terms
-
-   !> Append a term; there must be room.
-   pure subroutine append_term(slots, term, list)
-      !> Slots of its body and of the partner
-      integer(ip), intent(in) :: slots(2)
-      !> The term
-      real(wp), intent(in) :: term(n_terms)
-      type(term_list_t), intent(inout) :: list
-
-      list%n = list%n + 1_ip
-      list%slots(:, list%n) = slots
-      list%term(:, list%n) = term
-   end subroutine append_term
 
    !> Add late terms to the sums of a share of the bodies, in the order of the terms. Bodies with late terms lie close
    !> together. Threads therefore take turns in groups of bodies, whose sums fill whole cache lines.

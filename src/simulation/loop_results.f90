@@ -4,8 +4,9 @@ module polydem_loop_results
    use polydem_contact_incidence, only: incidence_t
    use polydem_contact_rows, only: contact_rows_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_sums, only: force_sums_t, term_list_t
+   use polydem_force_sums, only: force_sums_t
    use polydem_kinds, only: dp, ip, lp
+   use polydem_term_list, only: term_list_t
    use polydem_contact_flags, only: flag_limits_t
    use polydem_contact_shares, only: contact_shares_t
    use polydem_wall_terms, only: wall_terms_t

@@ -8,8 +8,9 @@ module polydem_body_contributions
    use polydem_bodies, only: bodies_t
    use polydem_cell, only: shear_flow
    use polydem_force_sums, only: force_sums_t, n_terms, of_elastic, of_normal, of_tangential, sum_energy, sum_torque, &
-      sum_x, sum_y, term_list_t
+      sum_x, sum_y
    use polydem_kinds, only: ip, wp
+   use polydem_term_list, only: term_list_t
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
