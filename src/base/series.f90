@@ -1,9 +1,11 @@
 !> Time series of a run: a row of named values at each of some steps, kept until a file takes the rows.
 !>
 !> Whoever has a quantity sets its column in `row` (`polydem_named_values`); `keep_row` then appends the row. All rows
-!> of a run have the same columns. The rows that are kept belong to a checkpoint, as no file has them yet.
+!> of a run have the same columns, which are set before rows are restored. The rows that are kept belong to a
+!> checkpoint, as no file has them yet.
 module polydem_series
    use polydem_errors, only: input_error, raise
+   use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, lp
    use polydem_named_values, only: named_values_t
    use polydem_serializer, only: serializer_t
@@ -29,7 +31,7 @@ module polydem_series
       procedure :: keep_row
       procedure :: drop_rows
       procedure :: serialize
-      procedure, private :: field_name
+      procedure, private :: field_name, hash_of_columns
    end type series_t
 
 contains
@@ -89,8 +91,9 @@ contains
       self%n = n
    end subroutine drop_rows
 
-   !> Serialize the rows that are kept.
+   !> Serialize the rows that are kept. A run with other columns cannot restore them.
    subroutine serialize(self, serializer)
+      !> The series with its columns
       class(series_t), intent(inout) :: self
       class(serializer_t), intent(inout) :: serializer
       integer(lp) :: n_rows, n_values
@@ -99,6 +102,8 @@ contains
       integer :: n_columns
 
       n_rows = int(self%n, lp)
+      call serializer%match(self%field_name('columns'), [self%hash_of_columns()], '1', 'hash of names and units of '// &
+                            'the columns of the '//trim(self%name))
       call serializer%field(self%field_name('rows'), n_rows, '1', 'rows that no segment has yet')
       if (allocated(serializer%error)) return
       if (serializer%is_reading) then
@@ -107,11 +112,11 @@ contains
          if (n_rows == 0_lp) return
          call serializer%count_rows(self%field_name('value'), n_values)
          if (allocated(serializer%error)) return
-         if (n_rows < 0_lp .or. n_rows > n_values .or. modulo(n_values, max(1_lp, n_rows)) /= 0_lp) then
-            call raise(serializer%error, input_error, self%field_name('value')//' has no whole number of columns')
+         n_columns = size(self%row%name) + 1
+         if (n_rows < 0_lp .or. n_rows > n_values .or. n_rows*int(n_columns, lp) /= n_values) then
+            call raise(serializer%error, input_error, self%field_name('value')//' has another number of columns')
             return
          end if
-         n_columns = int(n_values/n_rows)
          allocate (step(n_rows), time(n_rows), value(n_values))
       else
          if (n_rows == 0_lp) return
@@ -135,6 +140,22 @@ contains
       self%time(:self%n) = time
       self%value(:, :self%n) = reshape(value(self%n + 1:), [n_columns - 1, self%n])
    end subroutine serialize
+
+   !> Hash of the names and units of the columns
+   pure integer(lp) function hash_of_columns(self) result(hash)
+      class(series_t), intent(in) :: self
+      character(len=:), allocatable :: text
+      integer :: j, k
+
+      hash = 0_lp
+      if (.not. allocated(self%row%name)) return
+      do k = 1, size(self%row%name)
+         text = trim(self%row%name(k))//' '//trim(self%row%unit(k))
+         do j = 1, len(text)
+            hash = mix_word(hash, int(ichar(text(j:j)), lp))
+         end do
+      end do
+   end function hash_of_columns
 
    !> Name of a field in a checkpoint
    pure function field_name(self, field) result(name)

@@ -13,7 +13,9 @@ module polydem_collect_entries
    public :: collect_entries, equal_keys
 
    !> Greatest number of characters of an override in a message
-   integer, parameter :: longest_name = 200
+   integer, parameter :: longest_override = 200
+   !> Greatest number of characters of the name of an instance. Names of columns of the series begin with one
+   integer, parameter :: longest_name = 64
 
    !> Keys of &scene that another group calls otherwise: key, group, key of that group
    character(len=16), parameter :: equal_keys(3, 22) = reshape([character(len=16) :: &
@@ -126,6 +128,9 @@ contains
             else
                call raise(error, input_error, instance%place//': '//missing_text(entries(row), instance))
             end if
+            if (len(value%text) > longest_name .and. .not. allocated(error)) call raise(error, input_error, &
+               given%place//': ''name'' in &'//trim(instance%group)//' is a name of '//to_text(len(value%text))// &
+               ' characters, but a name has at most '//to_text(longest_name))
             if (allocated(error)) return
             same = index_of_instance(instances(:k - 1), instance%group, value%text)
             if (same > 0) then
@@ -261,8 +266,8 @@ contains
       integer :: dot, equals, last
 
       ! Every statement stores the name, so long overrides are shortened.
-      source%name = '--set '//override(:min(len(override), longest_name))
-      if (len(override) > longest_name) source%name = source%name//' ...'
+      source%name = '--set '//override(:min(len(override), longest_override))
+      if (len(override) > longest_override) source%name = source%name//' ...'
       source%has_lines = .false.
       equals = index(override, '=')
       dot = index(override(:max(0, equals - 1)), '.')

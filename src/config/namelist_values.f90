@@ -10,8 +10,6 @@ module polydem_namelist_values
    private
    public :: value_t, read_value, value_text, label, is_text, list_text
 
-   !> Greatest number of characters of a name. The names of columns of the series begin with one
-   integer, parameter :: longest_name = 64
    !> Characters of a name
    character(len=*), parameter :: name_characters = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_'//digits
@@ -244,8 +242,6 @@ contains
       else if (entry%type == 'name') then
          if (verify(literal%text, name_characters) > 0) problem = 'cannot be '//literal%as_written()// &
             '; a name has only letters, digits and _'
-         if (len(literal%text) > longest_name) problem = 'is a name of '//to_text(len(literal%text))// &
-            ' characters, but a name has at most '//to_text(longest_name)
       else if (entry%type == 'word' .and. all(split_words(entry%allowed) /= literal%text)) then
          problem = 'cannot be '//literal%as_written()//suggestion(literal%text, split_words(entry%allowed))
       end if

@@ -1,7 +1,6 @@
 !> Beginning of a run on all ranks: time 0 or a checkpoint, and the output files.
 module polydem_begin_run
    use polydem_broadcaster, only: broadcaster_t
-   use polydem_end_condition, only: pass_end
    use polydem_errors, only: error_t
    use polydem_former_step, only: find_former_step
    use polydem_global_hash, only: hash_scene
@@ -49,7 +48,6 @@ contains
       !> Allocated if the checkpoint cannot be restored
       type(error_t), allocatable, intent(inout) :: error
       type(broadcaster_t) :: broadcaster
-      logical :: begins
 
       allocate (broadcaster%comm, source=run%comm)
       broadcaster%is_reading = .not. run%comm%is_root()
@@ -63,7 +61,6 @@ contains
       call restore(run%folder, run%earlier, run%provenance%text_of('revision'), run%simulation, run%attempts, &
                    run%monitor, run%log, error)
       if (allocated(error)) return
-      call pass_end(run%simulation, begins, error)
       run%checkpoints%last_step = run%earlier%step
       run%checkpoints%next = modulo(run%earlier%checkpoint, n_checkpoints) + 1_ip
    end subroutine recall

@@ -12,9 +12,11 @@ module polydem_check
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
+   use polydem_start_from, only: return_to_state
    use polydem_strings, only: counted, to_text
    use polydem_scene_measures, only: measure_scene, scene_measures_t
    use polydem_thread_choice, only: thread_choice_t
+   use polydem_time_step, only: advance
    implicit none
    private
    public :: check_simulation
@@ -77,7 +79,8 @@ contains
       if (warnings > 0_lp) text = text//counted(warnings, 'warning')//' above'
    end function answer
 
-   !> Write the warnings about the initial state, then apply the guards of a run at step 0.
+   !> Write the warnings about the initial state, then apply the guards of a run at step 0, and do the first step: loads
+   !> and gravity may make bodies too fast only then.
    subroutine warn_at_start(simulation, measures, log, error)
       type(simulation_t), intent(inout) :: simulation
       type(scene_measures_t), intent(in) :: measures
@@ -91,6 +94,9 @@ contains
       call check_motion(simulation%motion%check, simulation%bodies, simulation%moving(:simulation%n_moving), &
                         simulation%step, simulation%dt, error)
       call check_step(monitor, simulation, .true., log, error)
+      if (.not. allocated(error)) call return_to_state(simulation, error)
+      if (.not. allocated(error)) call advance(simulation, error)
+      if (.not. allocated(error)) call check_step(monitor, simulation, .false., log, error)
    end subroutine warn_at_start
 
    !> Size of a frame [B]: bodies, and the initial contacts if contacts are written

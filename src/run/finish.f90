@@ -23,7 +23,7 @@ module polydem_finish
    use polydem_timers, only: n_stages
    implicit none
    private
-   public :: finish
+   public :: finish, write_csv
 
 contains
 
@@ -37,7 +37,7 @@ contains
       integer(lp) :: is_not_finite(1)
 
       associate (s => run%simulation, bodies => run%simulation%bodies)
-         if (code /= run_error .or. run%last_frame == s%step) return
+         if (code /= run_error .or. s%step <= max(run%last_frame, run%earlier%last_frame)) return
          is_not_finite = merge(0_lp, 1_lp, all(ieee_is_finite(bodies%position)) &
                                .and. all(ieee_is_finite(bodies%velocity)) .and. all(ieee_is_finite(bodies%angle)) &
                                .and. all(ieee_is_finite(bodies%angular_velocity)))
@@ -96,7 +96,9 @@ contains
 
    !> Write the series as comma-separated values. Called by the root rank only.
    subroutine write_csv(run, error)
+      !> The run; its segments are closed, and its series has its columns
       type(run_t), intent(inout) :: run
+      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return

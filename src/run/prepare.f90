@@ -8,7 +8,7 @@ module polydem_prepare
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: make_folder
-   use polydem_kinds, only: ip, lp
+   use polydem_kinds, only: dp, ip, lp
    use polydem_log_tables, only: write_header
    use polydem_monitor, only: new_monitor
    use polydem_provenance, only: collect_provenance
@@ -16,6 +16,7 @@ module polydem_prepare
    use polydem_restart, only: remove_surplus_files, find_restart
    use polydem_result_files, only: overlaps_name
    use polydem_run, only: run_t
+   use polydem_series_row, only: collect_row
    use polydem_output_intervals, only: choose_intervals
    use polydem_settings, only: settings_t
    use polydem_begin_run, only: build_start, recall
@@ -24,7 +25,7 @@ module polydem_prepare
    use polydem_wall_names, only: wall_names_text
    implicit none
    private
-   public :: build_and_lock, prepare
+   public :: build_and_lock, prepare, write_overlaps
 
 contains
 
@@ -70,6 +71,8 @@ contains
       call new_monitor(run%monitor, run%simulation)
       if (run%comm%is_root()) call warn_of_risks(run%simulation, run%measures, run%log, run%monitor%at_start)
       call choose_intervals(run)
+      ! A checkpoint has rows of the series without their columns.
+      if (run%series_steps > 0.0_dp .and. .not. allocated(error)) call collect_row(run%simulation)
       if (.not. allocated(error)) call recall(run, error)
       if (.not. allocated(error) .and. run%comm%is_root()) call finish_restart(run, error)
       call run%comm%all_reduce_error(error)
@@ -149,6 +152,7 @@ contains
    !> Write the deep initial contacts to the log and to a table. Collective; all ranks get the same error.
    subroutine write_overlaps(run, error)
       type(run_t), intent(inout) :: run
+      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (run%comm%is_root()) call run%manifest%reopen(run%folder//'/'//overlaps_name, error)

@@ -124,15 +124,15 @@ contains
       end associate
    end subroutine record_row
 
-   !> Write a frame, unless an earlier attempt wrote it; collective.
+   !> Write a frame, unless this or an earlier attempt wrote it; collective.
    subroutine write_frame(run, error)
       type(run_t), intent(inout) :: run
       !> Allocated if it cannot be written
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%simulation%step <= run%earlier%last_frame) return
+      if (run%simulation%step <= max(run%last_frame, run%earlier%last_frame)) return
       associate (s => run%simulation, output => run%simulation%settings%output)
-         call complete_wall_forces(run%comm, s%loop%walls, s%bodies)
+         call complete_wall_forces(run%comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
          if (allocated(s%traffic)) then
             call s%traffic%departures%drop_rows(run%earlier%last_frame)
             if (output%contacts) then

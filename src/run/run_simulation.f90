@@ -13,7 +13,7 @@ module polydem_run_simulation
    use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
    use polydem_finish, only: finish
-   use polydem_run_output, only: end_step, needs_table, write_stage
+   use polydem_run_output, only: end_step, needs_table, update_balance, write_frame, write_stage
    use polydem_settings, only: settings_t
    use polydem_begin_run, only: open_output
    use polydem_start_from, only: return_to_state
@@ -61,9 +61,10 @@ contains
    subroutine run_steps(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
-      logical :: is_due, must_stop
+      logical :: begins, is_due, must_stop
       integer(lp) :: first
 
+      if (run%earlier%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
       call write_stage(run)
       first = run%simulation%step
       if (run%earlier%checkpoint == 0_ip) then
@@ -131,14 +132,19 @@ contains
    end subroutine write_due_checkpoint
 
    !> Decide whether the present stage of the run ends, and begin the next one after its last step; collective. Before a
-   !> stage that has lasted too long stops the run, a checkpoint is written, so that it can go on with other settings.
+   !> stage that has lasted too long stops the run, the last frame and a checkpoint are written, so that it can go on
+   !> with other settings.
    subroutine change_stage(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: begins
 
       call decide_end(run%simulation)
-      if (is_at_limit(run%simulation)) call write_checkpoint(run, error)
+      if (is_at_limit(run%simulation)) then
+         call update_balance(run)
+         call write_frame(run, error)
+         if (.not. allocated(error)) call write_checkpoint(run, error)
+      end if
       if (allocated(error)) return
       call pass_end(run%simulation, begins, error)
       if (begins) call write_stage(run)

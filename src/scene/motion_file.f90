@@ -20,6 +20,8 @@ module polydem_motion_file
    integer, parameter :: longest_line = 1000
    !> Upper limit of the speeds, as of those in the table of entries [m/s]
    real(wp), parameter :: speed_limit = 1.0e6_wp
+   !> Byte order mark of UTF-8
+   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
    !> Upper limit of the values
    real(wp), parameter :: value_limit = 1.0e12_wp
 
@@ -109,6 +111,8 @@ contains
          read (unit, '(a)', iostat=status, iomsg=reason) line
          if (status /= 0) exit
          number = number + 1
+         ! Spreadsheets write this mark before a table in UTF-8.
+         if (number == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
          call replace_blanks(line)
          if (line == '' .or. line(1:1) == '#') cycle
          if (len_trim(line) > longest_line) then

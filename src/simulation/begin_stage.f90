@@ -15,7 +15,10 @@ module polydem_begin_stage
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: prepare_stages, begin_stage, continue_stages, find_last_steps, wall_vector
+   public :: prepare_stages, begin_stage, continue_stages, check_reference, find_last_steps, wall_vector
+
+   !> Distance of two centres that coincide but for rounding, relative to the radius of a body
+   real(wp), parameter :: coincident = sqrt(epsilon(1.0_wp))
 
 contains
 
@@ -163,9 +166,40 @@ contains
             'stage.'//stage%name, merge('duration', 'longest ', stage%until == 'duration'))//': the run is at step '// &
             to_text(self%step)//', behind the last step of the stage '//stage%name//', '//to_text(self%stages%last))
          if (allocated(error)) return
-         if (self%step == 0_lp .and. stage%until == 'strain') self%stages%reference = wall_vector(self)
+         if (self%step > 0_lp) return
+         if (stage%until == 'strain') self%stages%reference = wall_vector(self)
       end associate
+      call check_reference(self, error)
    end subroutine continue_stages
+
+   !> Check that the present stage has walls from which it can measure a strain. All ranks find the same.
+   subroutine check_reference(self, error)
+      type(simulation_t), intent(in) :: self
+      !> Names the stage and the walls
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: place
+      real(wp) :: radius
+      integer :: j, k
+
+      associate (stage => self%settings%stage(self%stages%number), reference => self%stages%reference)
+         if (stage%until /= 'strain') return
+         place = place_of(self%settings, 'stage.'//stage%name, 'wall')//': stage '//stage%name
+         do k = 1, size(self%walls%named%wall)
+            associate (wall => self%walls%named%wall(k))
+               if (wall%name /= stage%wall .and. wall%name /= stage%opposite) cycle
+               if (wall%is_gone) call raise(error, input_error, place//' measures its strain from the wall '// &
+                                            wall%name//', which has vanished')
+               radius = 0.0_wp
+               do j = 1, size(wall%id)
+                  radius = max(radius, self%bodies%radius(place_in(self%bodies%id, wall%id(j))))
+               end do
+               if (all(abs(reference) <= coincident*radius)) call raise(error, input_error, place//': the centres '// &
+                  'of the walls '//stage%wall//' and '//stage%opposite//' coincide, so their distance is no length '// &
+                  'for a strain; name two walls that face each other')
+            end associate
+         end do
+      end associate
+   end subroutine check_reference
 
    !> Vector from the wall `opposite` to the wall `wall` of the present stage, between the means of the centres of their
    !> bodies (2) [m]

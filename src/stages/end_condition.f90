@@ -4,7 +4,7 @@
 !> possible step. Quantities are exact sums, so all ranks decide alike. A condition that holds at a step ends the stage
 !> with the next one, so that the last step is known before it begins.
 module polydem_end_condition
-   use polydem_begin_stage, only: begin_stage, find_last_steps, wall_vector
+   use polydem_begin_stage, only: begin_stage, check_reference, find_last_steps, wall_vector
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: ip, lp, wp
@@ -37,14 +37,15 @@ contains
       end associate
    end function is_check
 
-   !> Whether the check after a step needs the table of contacts
+   !> Whether the check after a step needs the table of contacts: for its quantity, or because the run may stop with a
+   !> frame of this step
    pure logical function needs_contacts(simulation, step)
       type(simulation_t), intent(in) :: simulation
       !> The step, not before the present one
       integer(lp), intent(in) :: step
 
       needs_contacts = is_check(simulation, step)
-      if (needs_contacts) needs_contacts = any(simulation%settings%stage( &
+      if (needs_contacts) needs_contacts = step == simulation%stages%last .or. any(simulation%settings%stage( &
          simulation%stages%number)%until == [character(len=10) :: 'unbalanced', 'stress'])
    end function needs_contacts
 
@@ -171,7 +172,9 @@ contains
          begins = stages%number > 0 .and. stages%number < size(simulation%settings%stage) &
                   .and. simulation%step == stages%last
       end associate
-      if (begins) call begin_stage(simulation)
+      if (.not. begins) return
+      call begin_stage(simulation)
+      call check_reference(simulation, error)
    end subroutine pass_end
 
    !> Whether a condition has ended a stage as soon as it could: it held from the start

@@ -35,6 +35,20 @@ DANGERS = (
     ("gas", ("forces.law=area", "forces.damping=none"), "the area law is not conservative", 0),
 )
 
+#: Scenes that run, or that stop at their first step, with the exit code and the message of `check` and `run`
+WALLS = """\
+&wall name = 'floor' outline = 'rectangle' low = -0.1, -0.02 high = 0.1, 0 /
+&wall name = 'lid' outline = 'rectangle' low = -0.1, 0.04 high = 0.1, 0.05 /
+&grains name = 'g' region = 'box' low = -0.05, 0.001 high = 0.05, 0.03 number = 3 /
+"""
+FIRST_STEPS = {
+    "fine": (WALLS + "&load name = 'press' wall = 'lid' direction = 'y' force = -50 mass = 1 /\n", 0, ""),
+    "load": (WALLS + "&load name = 'press' wall = 'lid' direction = 'y' force = -1e8 mass = 0.01 /\n", 1,
+             "check the motion of the wall, or sign and unit of the load on it"),
+    "gravity": (WALLS + "&forces gravity = 0, -1e8 /\n", 1, "no point of it may move more than"),
+    "empty": ("&source name = 's' low = 0, 0 high = 0.1, 0.1 rate = 1e4 interval = 10 /\n", 0, ""),
+}
+
 
 def checked(program, path, *settings):
     """Exit code of `check`, its warnings and its message."""
@@ -71,6 +85,14 @@ def main():
         code, told, message = checked(program, inputs / f"{scene}.nml", *settings)
         assert code == expected and any(part in line for line in told), (scene, settings, code, told, message)
     with tempfile.TemporaryDirectory() as work:
+        for name, (text, code, part) in FIRST_STEPS.items():
+            path = Path(work) / f"{name}.nml"
+            path.write_text(text + "&integrate dt = 1e-5 duration = 1e-3 /\n", encoding="utf-8")
+            done = [subprocess.run([program, verb, str(path), *more], capture_output=True, text=True, timeout=600,
+                                   check=False) for verb, more in (("check", ()), ("run", (
+                                       "--set", f"output.folder={work}/{name}")))]
+            assert all(each.returncode == code and part in each.stderr for each in done), (name, done)
+            assert not any("NaN" in each.stdout for each in done), (name, done)
         scene, settings, part, _ = DANGERS[-1]
         words = [*settings, "integrate.duration=1e-3", f"output.folder={work}/result"]
         command = [program, "run", str(inputs / f"{scene}.nml")] + [word for each in words for word in ("--set", each)]

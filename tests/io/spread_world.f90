@@ -145,6 +145,7 @@ contains
             if (passive(i) .and. passive(j)) cycle
             contacts%n = contacts%n + 1_ip
             c = contacts%n
+            contacts%pair(c) = c
             contacts%first(c) = i
             contacts%second(c) = j
             code = 100_ip*bodies%global_index(i) + bodies%global_index(j)

@@ -94,7 +94,7 @@ contains
       if (comm%size == 1_ip) call whole_world(step, world)
       if (comm%size > 1_ip) call part_of_world(step, comm%rank, comm%size, world)
       call select_walls(world%bodies, world%contacts, walls)
-      call complete_wall_forces(comm, walls, world%bodies)
+      call complete_wall_forces(comm, world%contacts%first, walls, world%bodies)
    end subroutine make_part
 
    subroutine write_all(comm, folder, error)

@@ -5,8 +5,11 @@ import subprocess
 from itertools import product
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 from conftest import Outcome
+from polydem_post import Trajectory
 from runs import (
     ENVIRONMENT,
     FINDERS,
@@ -108,6 +111,38 @@ def test_contacts_that_share_the_damping_of_one_floor_have_the_same_bits(tmp_pat
     for ranks in (2, 3):
         several, _ = run(tmp_path / "scene.nml", tmp_path / str(ranks), ranks)
         assert state_hash(several) == state_hash(one)
+
+
+def write_comb(path, first):
+    """Squares fall on a fixed comb of ten pieces whose teeth catch them; it is the first or the last body."""
+    comb = [[(-0.1, -0.02), (0.1, -0.02), (0.1, 0.0), (-0.1, 0.0)]]
+    comb += [[(x, 0.0), (x + 0.008, 0.0), (x + 0.004, 0.012)] for x in (0.02 * k - 0.094 for k in range(9))]
+    squares = [[(x + a * i, y + a * j) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+               for k in range(45) for x, y, a in [(0.018 * (k % 9) - 0.07, 0.02 + 0.018 * (k // 9), 0.0085)]]
+    bodies = [[square] for square in squares]
+    bodies.insert(0 if first else len(bodies), comb)
+    sizes = [sum(map(len, body)) for body in bodies]
+    with h5py.File(path, "w") as file:
+        file["vertex"] = [corner for body in bodies for piece in body for corner in piece]
+        file["vertex_start"] = np.concatenate(([0], np.cumsum(sizes)))
+        file["piece"] = [k for body in bodies for k, piece in enumerate(body) for _ in piece]
+        file["fixed"] = [int(len(body) > 1) for body in bodies]
+
+
+@pytest.mark.parametrize("first", [True, False], ids=("first", "last"))
+def test_forces_on_a_concave_wall_are_summed_in_the_order_of_one_process(first, tmp_path):
+    write_comb(tmp_path / "bodies.h5", first)
+    (tmp_path / "scene.nml").write_text(
+        f"&scene name = 'file' bodies_file = '{tmp_path}/bodies.h5' /\n"
+        "&forces gravity = 3, -80 stiffness = 1e6 damping = 'hunt_crossley' damping_coefficient = 1 /\n"
+        "&integrate duration = 0.02 /\n&output frame_interval = 1e-3 contacts = .true. /\n&checkpoint steps = 150 /\n",
+        encoding="utf-8")
+    run(tmp_path / "scene.nml", tmp_path / "one")
+    expected = frames(tmp_path / "one")
+    assert len(Trajectory(tmp_path / "one").contacts(-1)) > 50
+    for ranks in (2, 3):
+        run(tmp_path / "scene.nml", tmp_path / str(ranks), ranks)
+        assert differences(expected, frames(tmp_path / str(ranks))) == []
 
 
 #: Fast grains that fly through the areas of all ranks

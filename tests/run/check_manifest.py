@@ -119,7 +119,11 @@ def flipped_bits_are_found(program):
             write(f"{folder}/{name}", bad)
             code, output, _ = program.check(folder)
             assert code == NO_FILE and f"WRONG  {name}" in output, (name, place, output)
-            if k % 4 == 0 and not name.startswith("checkpoint"):
+            if k % 4 == 0 and name == "overlaps.csv":
+                code, _, message = program.run(folder, "--continue", *RECORDED)
+                assert code == 0 and program.check(folder)[0] == 0, (place, message)
+                assert contents(folder) == contents("whole"), place
+            elif k % 4 == 0 and not name.startswith("checkpoint"):
                 code, _, message = program.run(folder, "--continue", *RECORDED)
                 assert code != 0 and f"{folder}/{name}" in message, (name, place, code, message)
             n_tried += 1
@@ -139,6 +143,10 @@ def missing_cut_and_exchanged_files_are_found(program):
         assert code == NO_FILE and f"WRONG  {name}" in output, (name, output)
         before = contents(folder)
         code, _, message = program.run(folder, "--continue", *RECORDED)
+        if name == "overlaps.csv":
+            # A run makes this table again.
+            assert code == 0 and contents(folder) == contents("whole"), message
+            return
         assert code == NO_FILE and f"{folder}/{name}" in message and "--force" in message, (name, code, message)
         assert contents(folder) == before
 

@@ -446,6 +446,29 @@ def pipes_are_refused_without_waiting_for_them(case):
     shutil.rmtree("piped")
 
 
+def closed_files_are_brought_to_disk(case, library):
+    here = os.path.realpath(".")
+    environment = {"LD_PRELOAD": library, "POLYDEM_FAIL_FOLDER": here,
+                   "POLYDEM_FAIL_LOG": os.path.join(here, "written")}
+    with open("tables.nml", "w", encoding="utf-8") as file:
+        file.write("&scene name = 'gas' bodies = 6 solid_fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /\n"
+                   "&forces stiffness = 1e6 /\n&integrate dt = 1e-5 duration = 1e-4 /\n&guards listed_depth = 1e-9 /\n"
+                   "&output series_interval = 2e-5 csv = .true. trace_steps = 2 step_profile = .true. /\n")
+    words = ("run", "tables.nml", "--threads", "1", "--set", "output.folder=tables")
+    code, _, message = case.call(*words, env=environment)
+    assert code == GOOD, message
+    with open("tables/manifest.txt", encoding="utf-8") as file:
+        closed = re.findall(r"^(\S+) +closed", file.read(), re.MULTILINE)
+    assert {"series.csv", "overlaps.csv", "profile.h5", "trace.h5", "steps.h5", "trajectory_0001.h5"} == {*closed}
+    with open("written", encoding="utf-8") as file:
+        calls = [line.split(" ", 2)[1:] for line in file.read().splitlines()]
+    for name in closed:
+        verbs = [verb for verb, path in calls if path.startswith(os.path.join(here, "tables", name))]
+        assert "fsync" in verbs, (name, verbs)
+        last = max(k for k, verb in enumerate(verbs) if "write" in verb)
+        assert "fsync" in verbs[last:], (name, verbs)
+
+
 TESTS = (too_many_threads_are_refused_before_anything_is_written,
          threads_that_openmp_or_the_system_do_not_grant_are_refused, threads_are_chosen_unless_they_are_given,
          variables_of_the_runtime_change_nothing, memory_that_is_not_granted_is_named,
@@ -465,9 +488,10 @@ def main():
             with open(name, "w", encoding="utf-8") as file:
                 file.write(text)
         case = Case(program, "trace.h5")
-        for test in (*TESTS, the_parents_of_new_folders_are_brought_to_disk):
+        watched = (the_parents_of_new_folders_are_brought_to_disk, closed_files_are_brought_to_disk)
+        for test in (*TESTS, *watched):
             began = time.monotonic()
-            test(case, *([library] if test is the_parents_of_new_folders_are_brought_to_disk else []))
+            test(case, *([library] if test in watched else []))
             clear()
             print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
 

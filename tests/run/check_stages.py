@@ -358,8 +358,15 @@ def faults_are_named(case):
              "must be another wall"),
             (whole([stage.format("duration = 1"), STAGES[1].replace("stage = 'press'", "stage = 'two'")]),
              "unknown stage 'two' in &motion"),
+            (whole([stage.format("until = 'strain' longest = 1 above = 1 wall = 'lid' opposite = 'bar'")])
+             + "&wall name = 'bar' outline = 'rectangle' low = -0.01, 0.1 high = 0.01, 0.11 /\n",
+             "the centres of the walls lid and bar coincide"),
             (whole([]), "'duration' in &integrate is required"),
-            (scene.format("nowhere") + rest, "nowhere holds no checkpoint"),
+            (scene.format("nowhere") + rest, "'start_from' in &scene: 'nowhere' is no folder; give the folder of"),
+            (scene.format("nowhere:3") + rest, "'nowhere' is no folder"),
+            (scene.format(".") + rest, ". holds neither checkpoint nor frame"),
+            (scene.format("source:-2") + rest, "there is no frame -2; frames count from 0, and -1 is the last one"),
+            (scene.format("source:99999999999") + rest, "source has no frame 99999999999"),
             (scene.format("source") + "&wall name = 'lit' outline = 'result' /\n" + rest,
              "has no wall 'lit'; did you mean"),
             (scene.format("source") + "&forces friction = 'none' damping = 'none' /\n"

@@ -15,6 +15,8 @@ module polydem_wall_terms
    type, extends(term_list_t) :: wall_terms_t
       !> Whether the elastic force has an energy (see `contacts_t`)
       logical :: energy_is_known = .false.
+      !> Index of each contact in the pair list, (n) or longer
+      integer(ip), allocatable :: pair(:)
       !> In a sheared cell the terms of bodies in contacts across the upper border, with the copies of their partners
       type(term_list_t) :: border
    end type wall_terms_t
@@ -37,14 +39,30 @@ contains
          n = n + merge(1_ip, 0_ip, fixed(block%first(c)) .or. fixed(block%second(c)))
       end do
       if (n == 0_ip) return
-      call reserve_terms(walls%n + n, walls%term_list_t)
+      call reserve_walls(walls%n + n, walls)
       do k = 1_ip, n
          c = found(k)
+         walls%pair(walls%n + 1_ip) = block%pair(c)
          associate (i => block%first(c), j => block%second(c))
             call append_term(merge([i, j], [j, i], fixed(i)), term_of(terms, c, fixed(i)), walls%term_list_t)
          end associate
       end do
    end subroutine append_walls
+
+   !> Make room for terms and their pairs.
+   pure subroutine reserve_walls(n, walls)
+      !> Number of terms in all
+      integer(ip), intent(in) :: n
+      type(wall_terms_t), intent(inout) :: walls
+      integer(ip), allocatable :: pair(:)
+
+      call reserve_terms(n, walls%term_list_t)
+      if (.not. allocated(walls%pair)) allocate (walls%pair(0))
+      if (n <= size(walls%pair)) return
+      allocate (pair(size(walls%slots, 2)))
+      pair(:walls%n) = walls%pair(:walls%n)
+      call move_alloc(pair, walls%pair)
+   end subroutine reserve_walls
 
    !> Append the contacts of a block across the upper or lower border of a sheared cell to a list.
    pure subroutine append_border(bodies, block, terms, border)
@@ -76,8 +94,9 @@ contains
 
       walls%n = 0_ip
       walls%border%n = 0_ip
-      call reserve_terms(sum(ranges%n), walls%term_list_t)
+      call reserve_walls(sum(ranges%n), walls)
       do r = size(ranges), 1, -1
+         if (ranges(r)%n > 0_ip) walls%pair(walls%n + 1_ip:walls%n + ranges(r)%n) = ranges(r)%pair(:ranges(r)%n)
          call append_list(ranges(r)%term_list_t, walls%term_list_t)
          if (ranges(r)%border%n == 0_ip) cycle
          call reserve_terms(walls%border%n + ranges(r)%border%n, walls%border)

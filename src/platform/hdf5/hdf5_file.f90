@@ -15,7 +15,7 @@ module polydem_hdf5_file
    use polydem_hdf5_strings, only: read_attribute_value, read_text
    use polydem_hdf5_writer, only: hdf5_writer_t, many_rows, one_row
    use polydem_kinds, only: dp, ip, lp
-   use polydem_strings, only: to_text
+   use polydem_strings, only: counted, to_text
    implicit none
    private
    public :: hdf5_file_t, part_t, one_row, many_rows, library_version, start_library
@@ -156,8 +156,8 @@ contains
       if (.not. allocated(error)) call dataset_shape(location, extent, error, is_checked=.true.)
       if (allocated(error)) return
       if (size(extent) /= rank) then
-         call reject(location, 'has the shape '//shape_text(extent)//' but must have '//to_text(int(rank, ip))// &
-                     ' dimensions', error)
+         call reject(location, 'has the shape '//shape_text(extent)//' but must have '// &
+                     counted(int(rank, lp), 'dimension'), error)
          return
       end if
       start = 0*extent

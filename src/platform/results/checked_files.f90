@@ -7,7 +7,7 @@ module polydem_checked_files
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip, lp
    use polydem_manifest, only: entry_t, manifest_t
-   use polydem_result_files, only: complete_name, conflict_text, manifest_name, name_in, segment_number, &
+   use polydem_result_files, only: complete_name, conflict_text, is_table, manifest_name, name_in, segment_number, &
       segment_path
    use polydem_strings, only: to_text
    implicit none
@@ -59,7 +59,8 @@ contains
       end do
    end subroutine check_free
 
-   !> Check that all closed files are unchanged since they were closed, and that the segments are consecutive.
+   !> Check that all closed files but tables, which are made again, are unchanged since they were closed, and that the
+   !> segments are consecutive.
    subroutine check_closed(manifest, folder, error, only)
       !> Valid manifest
       type(manifest_t), intent(in) :: manifest
@@ -76,7 +77,7 @@ contains
       call find_segments(manifest, folder, places, problem)
       do k = 1, manifest%n
          if (allocated(problem)) exit
-         if (.not. manifest%entry(k)%is_closed) cycle
+         if (.not. manifest%entry(k)%is_closed .or. is_table(manifest%entry(k)%name)) cycle
          if (present(only)) then
             if (manifest%entry(k)%name /= only) cycle
          end if

@@ -14,8 +14,8 @@
 !> An open file may be created, changed and removed by the run; this also covers the temporary names NAME.unfinished
 !> and NAME.open. A closed file is complete and final. A file is listed as open before it is created, changed or
 !> removed, and as closed after it has its final name. A killed program may therefore leave a file with its final name
-!> that is not closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5 and
-!> overlaps.csv are closed. log.txt, running.lock and the checkpoints, which have their own checksums, stay open.
+!> that is not closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5, series.csv
+!> and overlaps.csv are closed. log.txt, running.lock and the checkpoints, which have their own checksums, stay open.
 !>
 !> Each change replaces the whole list atomically.
 module polydem_manifest
@@ -320,7 +320,7 @@ contains
       if (self%entry(k)%is_closed) call replace_entry(self, k, entry_t(name=name_in(path)), error)
    end subroutine reopen
 
-   !> Mark a file as final, with its length and checksum. A no-op if the file does not exist.
+   !> Flush a file to disk, and mark it as final, with its length and checksum. A no-op if the file does not exist.
    subroutine close_file(self, path, error, frames)
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
@@ -336,6 +336,9 @@ contains
       entry = entry_t(name=name_in(path), is_closed=.true.)
       if (.not. link_exists(self%folder//'/'//trim(entry%name), error)) return
       if (present(frames)) entry%frames = frames
+      ! After a loss of power the file must be as the list says.
+      call sync_file(self%folder//'/'//trim(entry%name), error)
+      if (allocated(error)) return
       call sum_file(self%folder//'/'//trim(entry%name), entry%bytes, entry%checksum, error)
       if (.not. allocated(error)) call replace_entry(self, k, entry, error)
    end subroutine close_file

@@ -20,7 +20,7 @@ module polydem_result_files
    private
    public :: segment_path, checkpoint_path, log_name, overlaps_name, profile_name, series_name, steps_name, trace_name
    public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, stem, segment_number, last_segment, &
-      manifest_name, forms_of, complete_name, conflict_text
+      manifest_name, forms_of, complete_name, conflict_text, is_table
 
    !> Suffix of the temporary name of an incomplete file other than a segment
    character(len=*), parameter :: unfinished = '.unfinished'
@@ -35,6 +35,14 @@ module polydem_result_files
       trace_name = 'trace.h5', steps_name = 'steps.h5', overlaps_name = 'overlaps.csv', series_name = 'series.csv'
 
 contains
+
+   !> Whether a file is a table that a run makes again when it is continued, if the table is missing or damaged
+   elemental logical function is_table(name)
+      !> Name of the file without its folder
+      character(len=*), intent(in) :: name
+
+      is_table = name == series_name .or. name == overlaps_name
+   end function is_table
 
    !> Default result folder: results/<name of the input file without path and suffix>
    pure function default_folder(input_file) result(folder)

@@ -15,10 +15,12 @@ contains
 
    !> Complete the forces and torques on fixed bodies on the root rank, which writes them. Collective.
    !>
-   !> All terms are sent to the root rank and summed in descending order of the partner. This is the order of
+   !> All terms are sent to the root rank and summed in descending order of the pairs of pieces. This is the order of
    !> `force_sums`: the sums have the same bits as in a run on one rank. In such a run they are complete already.
-   subroutine complete_wall_forces(comm, walls, bodies)
+   subroutine complete_wall_forces(comm, first, walls, bodies)
       class(communicator_t), intent(inout) :: comm
+      !> Lower piece of each pair of the pair list
+      integer(ip), intent(in) :: first(:)
       !> Contacts of the bodies of this rank with fixed bodies
       type(wall_terms_t), intent(in) :: walls
       !> Bodies of this rank; on the root rank `force` and `torque` of fixed bodies change
@@ -28,49 +30,56 @@ contains
       integer(ip), allocatable :: counts(:), from(:)
 
       if (comm%size == 1_ip) return
-      call list_terms(bodies, walls, key, terms)
+      call list_terms(bodies, first, walls, key, terms)
       allocate (counts(0:comm%size - 1_ip))
       counts = 0_ip
       counts(0) = size(key, 2, kind=ip)
       call comm%all_to_all(key, counts, all_keys, from)
       call comm%all_to_all(terms, counts, all_terms, from)
-      if (comm%is_root()) call sum_terms(all_keys(1, :), all_terms, bodies)
+      if (comm%is_root()) call sum_terms(all_keys, all_terms, bodies)
    end subroutine complete_wall_forces
 
    !> List the terms of the forces on fixed bodies. Their partners are free bodies of this rank.
-   subroutine list_terms(bodies, walls, key, terms)
+   subroutine list_terms(bodies, first, walls, key, terms)
       type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: first(:)
       type(wall_terms_t), intent(in) :: walls
-      !> Global indices of the fixed body and of its partner in one word, (1, term)
+      !> Global index of the fixed body, and from 1 the number of its piece if this is the lower one of the pair, else
+      !> 0, in one word; global index of the partner, (2, term)
       integer(lp), allocatable, intent(out) :: key(:, :)
       !> Terms of the fixed bodies, (n_terms, term)
       real(wp), allocatable, intent(out) :: terms(:, :)
-      integer(ip) :: c
+      integer(ip) :: c, number
 
-      allocate (key(1, walls%n), terms(n_terms, walls%n))
+      allocate (key(2, walls%n), terms(n_terms, walls%n))
       do c = 1_ip, walls%n
-         key(1, c) = pair_key(bodies%global_index(walls%slots(1, c)), bodies%global_index(walls%slots(2, c)))
+         associate (s => walls%slots(1, c), partner => walls%slots(2, c))
+            number = 0_ip
+            if (s < partner) number = first(walls%pair(c)) - bodies%pieces%first_of(s) + 1_ip
+            key(:, c) = [pair_key(bodies%global_index(s), number), int(bodies%global_index(partner), lp)]
+         end associate
          terms(:, c) = walls%term(:, c)
       end do
    end subroutine list_terms
 
-   !> Sum the terms of each fixed body in descending order of keys. Terms with the same key, of the pieces of one free
+   !> Sum the terms of each fixed body in descending order of keys. Terms with the same keys, of the pieces of one free
    !> body, come from one rank in the order of its sums, which they keep.
    subroutine sum_terms(keys, terms, bodies)
-      integer(lp), intent(in) :: keys(:)
+      integer(lp), intent(in) :: keys(:, :)
       real(wp), intent(in) :: terms(:, :)
       type(bodies_t), intent(inout) :: bodies
       integer(ip), allocatable :: order(:)
       real(wp) :: total(n_terms)
       integer(ip) :: k, s
 
-      order = ascending_order(-keys)
+      order = ascending_order(-keys(2, :))
+      order = order(ascending_order(-keys(1, order)))
       k = 1_ip
       do s = bodies%n, 1_ip, -1_ip
          if (.not. bodies%fixed(s)) cycle
          total = 0.0_wp
          do while (k <= size(order))
-            if (first_of(keys(order(k))) /= bodies%global_index(s)) exit
+            if (first_of(keys(1, order(k))) /= bodies%global_index(s)) exit
             total = total + terms(:, order(k))
             k = k + 1_ip
          end do

@@ -126,6 +126,7 @@ contains
       logical :: any_free
 
       any_free = measures%free > 0_lp
+      if (measures%free + measures%fixed == 0_lp) return
       call log%write_line('extent     '//extent_text(measures%extent))
       if (any_free) then
          call log%write_line('           free bodies '//extent_text(measures%free_extent))

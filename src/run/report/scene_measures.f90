@@ -253,6 +253,7 @@ contains
       call reduce_to_greatest(comm, measures%extent(:, 2))
       call reduce_to_least(comm, measures%free_extent(:, 1))
       call reduce_to_greatest(comm, measures%free_extent(:, 2))
+      if (bodies%n_all == 0_ip) measures%extent = 0.0_wp
       if (measures%free == 0_lp) measures%free_extent = 0.0_wp
       measures%thickness = -measures%thickness
       call keep_greatest(comm, measures%thickness, measures%thinnest)

@@ -132,7 +132,8 @@ contains
       if (comm%size > 1_ip) call limit%set(checkpoint_path(folder, self%next), comm%rank, room)
       call file%create(checkpoint_path(folder, self%next), provenance, comm, room)
       if (.not. allocated(file%error)) call lay_out_rows(comm, simulation, file)
-      call complete_wall_forces(comm, simulation%loop%walls, simulation%bodies)
+      call complete_wall_forces(comm, simulation%search%neighbours%pairs%first, simulation%loop%walls, &
+                                simulation%bodies)
       call collect_counts(simulation)
       call serialize_run(file, simulation, attempts, monitor)
       call file%complete(error)

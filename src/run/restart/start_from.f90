@@ -14,11 +14,11 @@ module polydem_start_from
    use polydem_communicator, only: communicator_t
    use polydem_enter_cell, only: join_copies
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_file_system, only: exists
+   use polydem_file_system, only: exists, is_folder
    use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_replace_bodies, only: settle_bodies
-   use polydem_result_files, only: checkpoint_path, n_checkpoints
+   use polydem_result_files, only: checkpoint_path, n_checkpoints, segment_path
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
@@ -53,31 +53,50 @@ contains
       type(origin_t), intent(out) :: origin
       !> Names the entry and what is wrong with the result
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: folder, which
+      character(len=:), allocatable :: folder, frame, which
       real(dp) :: time
       integer(ip) :: number
       integer :: colon, status
 
       folder = settings%scene%start_from
+      frame = ''
       colon = index(folder, ':', back=.true.)
-      if (colon > 0) then
-         if ((verify(folder(colon + 1:), '0123456789') == 0 .or. folder(colon + 1:) == '-1') .and. &
-             colon < len(folder)) then
-            read (folder(colon + 1:), *, iostat=status) number
-            if (status /= 0) number = huge(1_ip)
-            folder = folder(:colon - 1)
-            origin%is_frame = .true.
-            call find_frame(folder, number, origin%path, origin%row, time, error)
-            which = 'frame '//to_text(number)
-            if (number < 0_ip) which = 'the last frame'
-            if (.not. allocated(error)) origin%note = 'start      from '//which//' of '//folder//', at '// &
-               to_text(real(time, wp))//' s; contact history and accelerations begin anew'
-         end if
+      if (colon > 0) frame = folder(colon + 1:)
+      if (is_number(frame)) then
+         folder = folder(:colon - 1)
+         origin%is_frame = .true.
       end if
-      if (.not. origin%is_frame) call find_checkpoint(folder, origin, error)
+      if (.not. is_folder(folder, error)) then
+         call raise(error, input_error, quoted(folder)//' is no folder; give the folder of a result, such as '// &
+                    'results/NAME, relative to the folder in which polydem is started')
+      else if (origin%is_frame) then
+         read (frame, *, iostat=status) number
+         if (status /= 0) then
+            call raise(error, input_error, folder//' has no frame '//frame//': the number is too large')
+         else if (number < -1_ip) then
+            call raise(error, input_error, 'there is no frame '//frame//'; frames count from 0, and -1 is the last one')
+         else
+            call find_frame(folder, number, origin%path, origin%row, time, error)
+         end if
+         which = 'frame '//frame
+         if (frame == '-1') which = 'the last frame'
+         if (.not. allocated(error)) origin%note = 'start      from '//which//' of '//folder//', at '// &
+            to_text(real(time, wp))//' s; contact history and accelerations begin anew'
+      else
+         call find_checkpoint(folder, origin, error)
+      end if
       if (.not. allocated(error)) call read_surroundings(origin%path, origin%row, origin%around, error)
       if (allocated(error)) call blame(settings, error)
    end subroutine find_origin
+
+   !> Whether a text is a whole number, with or without a minus
+   pure logical function is_number(text)
+      character(len=*), intent(in) :: text
+      integer :: first
+
+      first = 1 + merge(1, 0, index(text, '-') == 1)
+      is_number = len(text) >= first .and. verify(text(first:), '0123456789') == 0
+   end function is_number
 
    !> Let a message name the entry.
    pure subroutine blame(settings, error)
@@ -110,7 +129,10 @@ contains
          origin%path = checkpoint_path(folder, k)
          origin%note = 'start      from '//origin%path//', step '//to_text(step)//', with contact history'
       end do
-      if (newest < 0_lp) call raise(error, input_error, folder//' holds no checkpoint. Let its run end with '// &
+      if (newest >= 0_lp .or. allocated(error)) return
+      if (.not. exists(segment_path(folder, 1_ip), error)) call raise(error, input_error, folder//' holds neither '// &
+         'checkpoint nor frame: it is no result folder, or its run has just begun')
+      call raise(error, input_error, folder//' holds no checkpoint. Let its run end with '// &
          'checkpoint.at_end = .true., or start from a frame, such as '//quoted(folder//':0'))
    end subroutine find_checkpoint
 
@@ -203,12 +225,16 @@ contains
       type(wall_bodies_t), allocatable, intent(inout) :: named(:)
       type(error_t), allocatable, intent(inout) :: error
       type(wall_bodies_t), allocatable :: former(:)
-      character(len=64), allocatable :: names(:)
+      character(len=:), allocatable :: names(:)
       integer :: j, k, place
 
       call find_wall_names(path, former, error)
       if (allocated(error)) return
-      allocate (names(size(former)))
+      place = 0
+      do j = 1, size(former)
+         place = max(place, len(former(j)%name))
+      end do
+      allocate (character(len=place) :: names(size(former)))
       do j = 1, size(former)
          names(j) = former(j)%name
       end do

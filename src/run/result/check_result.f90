@@ -8,8 +8,8 @@ module polydem_check_result
    use polydem_kinds, only: ip
    use polydem_log, only: log_t
    use polydem_manifest, only: entry_t, manifest_t
-   use polydem_result_files, only: checkpoint_path, complete_name, forms_of, manifest_name, n_checkpoints, name_in, &
-      overlaps_name, profile_name, segment_number, series_name, steps_name, trace_name
+   use polydem_result_files, only: checkpoint_path, complete_name, forms_of, is_table, manifest_name, n_checkpoints, &
+      name_in, profile_name, segment_number, steps_name, trace_name
    use polydem_strings, only: to_text, counted
    implicit none
    private
@@ -80,6 +80,7 @@ contains
       call check_unfinished(folder, name, findings, error)
       if (entry%is_closed) then
          call find_problem(folder, entry, problem, failure)
+         if (allocated(problem) .and. is_table(name)) problem = problem//'; --continue makes it again'
          remark = to_text(entry%bytes)//' bytes'
          if (segment_number(name) > 0_ip) remark = remark//', '//counted(entry%frames(1), 'frame')//', steps '// &
             to_text(entry%frames(2))//' to '//to_text(entry%frames(3))
@@ -164,7 +165,7 @@ contains
       character(len=*), intent(in) :: name
 
       gets_closed = segment_number(name) > 0_ip .or. name == profile_name .or. name == trace_name .or. &
-                    name == steps_name .or. name == overlaps_name .or. name == series_name
+                    name == steps_name .or. is_table(name)
    end function gets_closed
 
    !> Count a file and write its line.

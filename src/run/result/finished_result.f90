@@ -1,20 +1,23 @@
 !> Detection of a finished result: a restart of a finished run does nothing.
 module polydem_finished_result
    use polydem_changed_entries, only: changed_entries
-   use polydem_checked_files, only: check_closed
+   use polydem_checked_files, only: check_closed, find_problem, find_segments
    use polydem_errors, only: error_t
+   use polydem_finish, only: write_csv
    use polydem_folder_lock, only: lock_path
    use polydem_folders, only: link_exists
-   use polydem_kinds, only: lp
+   use polydem_kinds, only: ip, lp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_hash
    use polydem_manifest, only: manifest_t
    use polydem_profile_file, only: read_final_status
    use polydem_provenance, only: origin_of
-   use polydem_result_files, only: name_in, profile_name
+   use polydem_prepare, only: write_overlaps
+   use polydem_result_files, only: name_in, overlaps_name, profile_name, series_name
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
    use polydem_begin_run, only: build_start
+   use polydem_series_row, only: collect_row
    implicit none
    private
    public :: find_finished_result, is_finished
@@ -57,7 +60,61 @@ contains
                                                   last_state, error)
       if (allocated(last_state) .and. .not. allocated(error)) call remove_remains(run, error)
       call run%comm%all_reduce_error(error)
+      if (.not. allocated(error)) call renew_tables(run, allocated(last_state), error)
    end subroutine find_finished_result
+
+   !> Make the tables of a finished result again that are missing or damaged. Collective; all ranks get the same error.
+   subroutine renew_tables(run, is_finished, error)
+      !> The run at time 0, with the valid manifest of its folder
+      type(run_t), intent(inout) :: run
+      !> Whether the root rank has found a finished result
+      logical, intent(in) :: is_finished
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: note, problem
+      integer, allocatable :: places(:)
+      integer(lp) :: is_wrong(2)
+
+      is_wrong = 0_lp
+      if (is_finished) is_wrong = merge(1_lp, 0_lp, [is_damaged(series_name), is_damaged(overlaps_name)])
+      call run%comm%broadcast(is_wrong)
+      if (all(is_wrong == 0_lp)) return
+      if (run%comm%is_root()) then
+         call run%lock%acquire(run%folder, note, error)
+         call run%log%open('', error)
+         if (.not. allocated(error)) call run%manifest%continue_writing()
+         call find_segments(run%manifest, run%folder, places, problem)
+         run%trajectory%number = size(places, kind=ip)
+      end if
+      call run%comm%all_reduce_error(error)
+      if (is_wrong(1) == 1_lp .and. .not. allocated(error)) then
+         call collect_row(run%simulation)
+         if (run%comm%is_root()) call write_csv(run, error)
+         call run%log%write_line(run%folder//'/'//series_name//' was missing or damaged, and is made again')
+         call run%comm%all_reduce_error(error)
+      end if
+      if (is_wrong(2) == 1_lp .and. .not. allocated(error)) then
+         call run%log%write_line(run%folder//'/'//overlaps_name//' was missing or damaged, and is made again')
+         call write_overlaps(run, error)
+      end if
+      call run%log%close()
+      call run%lock%release()
+
+   contains
+
+      !> Whether the result has a table that is missing or damaged
+      logical function is_damaged(name)
+         character(len=*), intent(in) :: name
+         type(error_t), allocatable :: failure
+         integer :: k
+
+         k = run%manifest%place_of(name)
+         is_damaged = .false.
+         if (k == 0) return
+         call find_problem(run%folder, run%manifest%entry(k), problem, failure)
+         is_damaged = allocated(problem) .or. .not. run%manifest%entry(k)%is_closed
+      end function is_damaged
+
+   end subroutine renew_tables
 
    !> Remove lock and unfinished files of a run that is dead; nothing happens if it released its lock.
    subroutine remove_remains(run, error)
