@@ -1,6 +1,6 @@
 !> Warnings about what is asked of a wall that has vanished: to yield to a load, to move, to bound a sample.
 module polydem_vanished_walls
-   use polydem_entry_warnings, only: add
+   use polydem_wall_warnings, only: add
    use polydem_kinds, only: wp
    use polydem_settings, only: settings_t
    use polydem_source_locations, only: place_of
