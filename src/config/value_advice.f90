@@ -21,6 +21,8 @@ contains
       character(len=:), allocatable :: text
 
       text = ''
+      if (.not. is_number(lower_case(statement%values(1)%text))) text = no_expression(statement%values(1)%text)
+      if (text /= '') return
       if (index(entry%meaning, 'Smallest and largest') == 1 .and. size(statement%values) == 1) then
          if (is_number(lower_case(statement%values(1)%text))) text = ', the smallest and the largest; write '// &
             statement%values(1)%text//', '//statement%values(1)%text

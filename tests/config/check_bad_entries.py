@@ -73,8 +73,8 @@ REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAM
             "contact_pair": {"materials": f"'{NAME}', '{NAME}'", "friction_coefficient": "0.1"}}
 #: What is not a number, or not one number
 NO_NUMBERS = ("'text'", "word", ".true.", "nan", "NaN", "inf", "-inf", "Infinity", "", "1 2 3", "1, 2, 3", ",", "1,,2",
-              "0x10", "1_4", "2*1", "(1,2)", "1.e", "--1", "1e+", "+", "1d400", "1e400", "1e999999", "1e-400",
-              "1" + 400*"0")
+              "0x10", "1_4", "2**1", "2*", "*1", "(1,2)", "1.e", "--1", "1e+", "+", "1d400", "1e400", "1e999999",
+              "1e-400", "1" + 400*"0")
 #: Numbers of any size
 NUMBERS = ("-1", "0", "9e99", "-9e99", "1e-300", "-1e-300", "1.7e308", "1e30", "1e12", "1e9", "1e-20", "1.", "1, 2",
            "0." + 400*"3")

@@ -249,9 +249,9 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
         problems += _problems_of_entry(text, entry)
         if re.search(r"[\[\](){}]", values):
             problems.append(f"{text}: values stand without brackets, {LISTING}")
-        elif RANGE.fullmatch(values):
+            continue
+        if RANGE.fullmatch(values):
             problems.append(f"{text}: is no range; write the values out, {LISTING}")
-        if problems:
             continue
         if entry in columns + entries:
             problems.append(f"{text}: {entry} is given twice")
