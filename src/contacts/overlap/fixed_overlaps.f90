@@ -97,7 +97,8 @@ contains
             else
                call find_overlap(outline_of(bodies, a), outline_of(bodies, b), &
                                  offset + (bodies%pieces%arm(:, b) - bodies%pieces%arm(:, a)), &
-                                 bodies%pieces%radius(a), bodies%pieces%radius(b), true_area, overlap, features, rejected)
+                                 bodies%pieces%radius(a), bodies%pieces%radius(b), true_area, overlap, &
+                                 features, rejected)
                overlap%centroid = overlap%centroid + bodies%pieces%arm(:, a)
             end if
             if (overlap%area > greatest%area) greatest = overlap
