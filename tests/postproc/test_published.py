@@ -50,6 +50,7 @@ OTHERS = {
     "tests/README.md",
     "tests/faults.md",
     "tests/hard_cases.md",
+    "tests/invariances/README.md",
     "tests/verification/reference/README.md",
 }
 

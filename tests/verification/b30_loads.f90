@@ -94,12 +94,20 @@ contains
       if (allocated(error)) return
       width = 0.1_wp + simulation%walls%loads(2)%place
       height = 0.301_wp + simulation%walls%loads(1)%place
-      call stress(simulation%bodies, simulation%contacts, simulation%comm, sample_area_t(size=[width, height]), tensor)
+      call stress(simulation%bodies, simulation%contacts, simulation%comm, everywhere(width, height), tensor)
       call table%expect_relative('at rest: stress of the contacts, ''between'' two walls [N/m]', 2.0e3_wp, &
                                  tensor(2, 2), 1.0e-3_wp)
       call table%expect_relative('at rest: stress of the contacts, on a given width [N/m]', 1.0e3_wp*0.3_wp/height, &
                                  tensor(1, 1), 1.0e-3_wp)
    end subroutine rest
+
+   !> Area of a sample that has all bodies in it
+   pure type(sample_area_t) function everywhere(width, height)
+      !> Width and height of the sample [m]
+      real(wp), intent(in) :: width, height
+
+      everywhere = sample_area_t(low=[-1.0_wp, -1.0_wp], high=[1.0_wp, 1.0_wp], size=[width, height])
+   end function everywhere
 
    !> Groups of a biaxial test: walls of another material have no friction. The sample is pressed for 1 s. The side wall
    !> is light, so that it follows the sample, and hardly damped, since its damping bears a part of the stress.
@@ -173,8 +181,7 @@ contains
          width = 2.0_wp*side_of(number) + simulation%walls%loads(1)%place
          ! Top and bottom bodies belong to walls that are nowhere else.
          height = top_of(simulation) - (-side_of(number))
-         call stress(simulation%bodies, simulation%contacts, simulation%comm, sample_area_t(size=[width, height]), &
-                     tensor)
+         call stress(simulation%bodies, simulation%contacts, simulation%comm, everywhere(width, height), tensor)
          sums = sums + [tensor(1, 1), tensor(2, 2)*width, force_of_top(simulation)]
          n = n + 1
       end do
