@@ -1,6 +1,8 @@
 """Runs in stages: they equal runs that start from each other, and any restart, number of threads and ranks.
 
 usage: check_stages.py PROGRAM
+
+The Python of .venv runs it if that of the command lacks h5py.
 """
 
 import os
@@ -12,9 +14,17 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
-import h5py
 from check_continue import BAD_INPUT, FAILED
+
+try:
+    import h5py
+except ImportError:
+    PYTHON = Path(__file__).resolve().parents[2]/".venv"/"bin"/"python"
+    if Path(sys.executable) == PYTHON or not PYTHON.exists():
+        sys.exit(f"{sys.executable} lacks h5py; ./polydem test makes an environment that has it")
+    os.execv(PYTHON, [str(PYTHON), *sys.argv])
 
 #: An mpirun that ends with its ranks
 MPIRUN = (os.path.join(os.path.dirname(__file__), "..", "..", "src", "packaging", "watch_ranks"), "mpirun",

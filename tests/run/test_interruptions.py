@@ -13,9 +13,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from check_writes import Call, sample
 
 PROGRAM = os.path.abspath(os.environ["POLYDEM_PROGRAM"])
-HOSTILE = os.environ.get("POLYDEM_HOSTILE_SYSTEM", "")
+FAILING = os.environ.get("POLYDEM_FAILING_CALLS", "")
 
 #: Exit codes of a run, as inputs/getting_started.md lists them
 DONE, FAILED, EARLY = 0, 1, 75
@@ -40,9 +41,6 @@ OUTPUT = ("&output frame_interval = 5e-5 series_interval = 3e-5 csv = .true. fra
           "   contacts = .true. /\n&checkpoint steps = 7 at_end = {} /\n")
 STEPS = "&integrate dt = 1e-5 {} /\n"
 DURATION = STEPS.format("duration = 2.3e-4")
-
-#: Calls from one kill to the next
-STRIDE = int(os.environ.get("POLYDEM_KILL_STRIDE", "7"))
 
 #: Scenes by how the run ends, with the exit code
 ENDS = {
@@ -144,23 +142,22 @@ def test_a_signal_at_every_step_changes_nothing(run):
     assert_equal("chain", run[2])
 
 
-@pytest.mark.skipif(not HOSTILE, reason="the library of hostile_system.c is not there")
-def test_a_kill_at_any_call_changes_nothing(run):
-    """Between two calls to the system that change files a kill leaves the same files, whatever the step."""
-    call = killed = 0
-    while True:
-        folder = f"killed_{call}"
-        code, _, message = start(folder, LD_PRELOAD=HOSTILE, POLYDEM_HOSTILE="kill", POLYDEM_HOSTILE_AT=str(call + 1),
-                                 POLYDEM_HOSTILE_PLACE=folder, POLYDEM_HOSTILE_MARK="mark")
-        if not os.path.exists("mark"):
-            break
-        os.remove("mark")
-        assert code == -signal.SIGKILL, (code, message)
-        killed += 1
+@pytest.mark.skipif(not FAILING, reason="the library of failing_calls.c is not there")
+def test_a_kill_at_a_call_changes_nothing(run):
+    """Before the first and the last call of each kind that changes files, a kill leaves what can be continued."""
+    here = os.path.realpath(".")
+    library = {"LD_PRELOAD": FAILING, "POLYDEM_FAIL_HOW": "kill"}
+    code, _, message = start("counted", **library, POLYDEM_FAIL_FOLDER=f"{here}/counted", POLYDEM_FAIL_LOG=f"{here}/calls")
+    assert code == run[0], message
+    points = sample([Call(0, *line.split(" ", 2)) for line in Path("calls").read_text(encoding="utf-8").splitlines()])
+    assert len(points) > 20, points
+    for point in points:
+        folder = f"killed_{point.number}"
+        code, _, message = start(folder, **library, POLYDEM_FAIL_FOLDER=f"{here}/{folder}",
+                                 POLYDEM_FAIL_CALL=str(point.number))
+        assert code == -signal.SIGKILL, (str(point), code, message)
         finish(folder, run)
         shutil.rmtree(folder)
-        call += STRIDE
-    assert killed > 70 // STRIDE, killed
 
 
 def damage(path, how):
