@@ -323,7 +323,7 @@ def entry_cases(entries):
             if entry.name == "scene.boxes":
                 settings.pop("scene.bodies")
             name = f"entries/{entry.name}={value.replace(', ', ',')}" + f"@{scene}" * (scene != "drum")
-            name += "".join(f"-{word}" for word in words[:1] if scene == "parts")
+            name += "".join(f"-{word}" for word in words[:1] if scene == "parts" or entry.name.startswith("stage."))
             yield generated(name, settings, ranks=3 if entry.name.startswith("decomposition.") else None)
 
 
