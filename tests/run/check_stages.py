@@ -182,6 +182,21 @@ def walls_do_not_jump_when_motions_change(case):
         case.run(scene + more + rest.format("end = 7.8125e-3", "0.015625"), f"{kind}_on", "--continue", "--changed")
 
 
+def walls_that_have_vanished_stay_away(case):
+    """Finds a start from a checkpoint that brings the bodies of such a wall back."""
+    text = SCENE.format(seed=1).replace("high = 0.049, 0.11 /", "high = 0.049, 0.11 vanish_at = {} /")
+    rest = OUTPUT.format(duration="duration = 7.8125e-3", scheme="")
+    start = FOUND.replace("&wall name = 'lid' outline = 'result' /\n", "")
+    start += "&scene name = 'result' start_from = '{}' /\n"
+    case.run(text.format(1e-3) + rest, "gone")
+    message = case.run(start.format("gone") + rest, "back", code=BAD_INPUT)
+    assert "a wall that has vanished" in message and "'gone:-1'" in message, message
+    output = case.run(start.format("gone:-1") + rest, "away")
+    assert re.search(r"^bodies +63 ", output, re.MULTILINE), output
+    case.run(text.format(1.0) + rest, "closed")
+    assert re.search(r"^bodies +64 ", case.run(start.format("closed") + rest, "open"), re.MULTILINE)
+
+
 def a_stage_that_ends_at_once_is_told(case):
     text = whole(["&stage name = 'early' until = 'kinetic' below = 1e9 longest = 1 {} /\n", STAGES[1]])
     for more, steps in (("", 101), ("hold = 3.0517578125e-3", 201), ("check = 7", 8)):
@@ -391,7 +406,7 @@ def faults_are_named(case):
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
          a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was,
          bodies_beyond_the_border_start_where_their_copies_are, pieces_keep_their_history,
-         a_stage_that_ends_at_once_is_told, walls_do_not_jump_when_motions_change,
+         a_stage_that_ends_at_once_is_told, walls_do_not_jump_when_motions_change, walls_that_have_vanished_stay_away,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,
          a_stage_that_lasts_too_long_stops_the_run, faults_are_named)
 

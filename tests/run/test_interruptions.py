@@ -147,7 +147,8 @@ def test_a_kill_at_a_call_changes_nothing(run):
     """Before the first and the last call of each kind that changes files, a kill leaves what can be continued."""
     here = os.path.realpath(".")
     library = {"LD_PRELOAD": FAILING, "POLYDEM_FAIL_HOW": "kill"}
-    code, _, message = start("counted", **library, POLYDEM_FAIL_FOLDER=f"{here}/counted", POLYDEM_FAIL_LOG=f"{here}/calls")
+    code, _, message = start("counted", **library, POLYDEM_FAIL_FOLDER=f"{here}/counted",
+                             POLYDEM_FAIL_LOG=f"{here}/calls")
     assert code == run[0], message
     points = sample([Call(0, *line.split(" ", 2)) for line in Path("calls").read_text(encoding="utf-8").splitlines()])
     assert len(points) > 20, points

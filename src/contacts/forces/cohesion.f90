@@ -3,9 +3,9 @@
 !> With the conservative law the length is |N|, N the gradient of the effective area G with respect to the position, and
 !> the lever of the normal force is the moment of N. So the attraction has the potential -c G: the work on every
 !> closed path is zero. Not so with the laws that divide by the length of the overlap: at corners they do work on closed
-!> paths. With the area law it is as exact as that law is. A flat face of the width w holds the load c w. Two bodies rest
-!> at the depth c l/E without a load, l being the characteristic length of the elastic force. Degenerate contacts, which
-!> have no length, are not attracted.
+!> paths. With the area law it is as exact as that law is. A flat face of the width w holds the load c w. Two bodies
+!> rest at the depth c l/E without a load, l being the characteristic length of the elastic force. Degenerate contacts,
+!> which have no length, are not attracted.
 !>
 !> Friction and damping of tilts follow the pressure of the contact, the normal force without cohesion (as in S. Luding,
 !> Granular Matter 10 (2008) 235): a contact that cohesion alone holds together has friction.

@@ -21,6 +21,8 @@ module polydem_frame_reader
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Whether a checkpoint has the cells that bodies have crossed, and the shifts of the borders that they crossed
       logical :: has_images = .false., has_slides = .false.
+      !> Whether a checkpoint has bodies of walls that have vanished
+      logical :: has_gone_walls = .false.
       !> Greatest number of pieces of a body, in a checkpoint
       integer(ip) :: most_pieces = 1_ip
    end type surroundings_t
@@ -115,6 +117,7 @@ contains
       real(dp), allocatable :: shape(:, :), mass(:), inertia(:)
       real(wp), allocatable :: corners(:, :)
       type(frame_columns_t) :: frame
+      logical, allocatable :: is_gone(:)
       real(wp) :: c, s
       integer(ip) :: j, k, v
 
@@ -136,10 +139,12 @@ contains
             ': the data sets of its segment of a trajectory are inconsistent')
       end if
       if (.not. allocated(error)) call read_frame(file, row, id, frame, error)
+      if (.not. allocated(error)) call find_gone(file, row, fixed == 1_ip, is_gone, error)
       call file%close(error)
       if (allocated(error)) return
       do j = 1_ip, size(frame%body, kind=ip)
          k = frame%body(j)
+         if (is_gone(k)) cycle
          call sine_and_cosine(real(frame%angle(j), wp), s, c)
          corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
          do v = 1_ip, size(corners, 2, kind=ip)
@@ -158,6 +163,29 @@ contains
       end do
    end subroutine list_frame
 
+   !> Find out which bodies belong to walls that have vanished at a frame.
+   subroutine find_gone(file, row, is_fixed, is_gone, error)
+      type(hdf5_file_t), intent(in) :: file
+      !> Number of frames before this one in the segment
+      integer(lp), intent(in) :: row
+      !> Whether each body of the segment is fixed, (body)
+      logical, intent(in) :: is_fixed(:)
+      !> Whether its wall has vanished, (body)
+      logical, allocatable, intent(out) :: is_gone(:)
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), allocatable :: present_walls(:, :)
+
+      is_gone = spread(.false., 1, size(is_fixed))
+      if (.not. file%has('/walls/present', error)) return
+      call file%read('/walls/present', present_walls, error, rows=[row, 1_lp])
+      if (allocated(error)) return
+      if (size(present_walls) /= count(is_fixed)) then
+         call raise(error, input_error, '/walls/present has another number of bodies than there are fixed ones')
+      else
+         is_gone = unpack(present_walls(:, 1) < 0.5_dp, is_fixed, .false.)
+      end if
+   end subroutine find_gone
+
    !> Read what a checkpoint or a frame of a segment says of the periodic cell and of pieces.
    subroutine read_surroundings(path, row, found, error)
       !> Path of the checkpoint or segment
@@ -169,7 +197,7 @@ contains
       !> Names the file and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      integer(ip), allocatable :: most(:)
+      integer(ip), allocatable :: gone(:), most(:)
       real(dp), allocatable :: values(:), rows(:, :), shift(:), jump(:)
 
       call file%open(path, error)
@@ -190,8 +218,10 @@ contains
          call file%read('/frames/jump', jump, error, rows=[row, 1_lp])
       end if
       if (file%has('/vertices/piece', error)) call file%read('/run/most_pieces', most, error)
+      if (file%has('/run/gone', error)) call file%read('/run/gone', gone, error)
       call file%close(error)
       if (allocated(error)) return
+      if (allocated(gone)) found%has_gone_walls = any(gone == 1_ip)
       if (allocated(values)) then
          if (size(values) >= 2) found%size = real(values(1:2), wp)
       end if
