@@ -87,8 +87,8 @@ contains
       end if
       if (.not. allocated(error)) call read_surroundings(origin%path, origin%row, origin%around, error)
       if (origin%around%has_gone_walls) call raise(error, input_error, origin%path// &
-         ' has the bodies of a wall that has vanished, and they would be there again. Start from a frame, which has '// &
-         'them no more, such as '//quoted(folder//':-1'))
+         ' has the bodies of a wall that has vanished, and they would be there again. Start from a frame, which '// &
+         'has them no more, such as '//quoted(folder//':-1'))
       if (allocated(error)) call blame(settings, error)
    end subroutine find_origin
 

@@ -6,7 +6,7 @@ module polydem_choose_step
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, sum_exactly
    use polydem_kinds, only: ip, lp, wp
-   use polydem_run_duration, only: longest_run
+   use polydem_run_duration, only: longest_run, longest_stage
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
@@ -169,9 +169,24 @@ contains
       !> Simulated time [s], and its number of steps
       real(wp), intent(in) :: duration, steps
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: group, key
+      integer :: k
+      real(wp) :: longest
 
       if (steps >= 0.5_wp .and. steps < most_steps) return
-      call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
+      group = 'integrate'
+      key = 'duration'
+      longest = -1.0_wp
+      do k = 1, size(self%settings%stage)
+         associate (stage => self%settings%stage(k))
+            if (.not. longest_stage(stage) > longest) cycle
+            longest = longest_stage(stage)
+            group = 'stage.'//stage%name
+            key = 'longest'
+            if (stage%until == 'duration') key = 'duration'
+         end associate
+      end do
+      call raise(error, input_error, place_of(self%settings, group, key)//': a duration of '// &
                  to_text(duration)//' s with dt = '//to_text(self%dt)//' s requires '//to_text(steps)// &
                  ' steps, but only 1 to '//to_text(most_steps)//' are allowed. Change duration, dt, safety_factor '// &
                  'or speed in &integrate'//overrides_of(self%settings, 'integrate'))
