@@ -196,14 +196,17 @@ def read_frames(file, answer):
         where = contacts["start"][()]
         pairs = np.stack([contacts["first"][()], contacts["second"][()]], axis=1)
     known = {frame.step for frame in answer.frames}
+    present = file["walls/present"][()] if "walls/present" in file else None
     force = file["walls/force"][()].sum(axis=1) if "walls" in file else np.zeros((len(step), 2))
     for k in range(len(step)):
         if int(step[k]) in known:
             continue
         rows = slice(starts[k], starts[k + 1]) if ragged else k
-        frame = Frame(int(step[k]), float(time[k]), identifiers[rows] if ragged else identifiers,
-                      data["position"][rows], data["angle"][rows], data["velocity"][rows],
-                      data["angular_velocity"][rows])
+        names = identifiers[rows] if ragged else identifiers
+        # Walls that have vanished are no bodies of the frame.
+        there = ~np.isin(names, file["walls/id"][()][present[k] == 0]) if present is not None else slice(None)
+        frame = Frame(int(step[k]), float(time[k]), names[there],
+                      *(data[key][rows][there] for key in ("position", "angle", "velocity", "angular_velocity")))
         if cell is not None:
             frame.low = group["cell_low"][k] if "cell_low" in group else cell["low"][()]
             frame.size = group["cell_size"][k] if "cell_size" in group else cell["size"][()]
