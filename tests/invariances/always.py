@@ -87,8 +87,9 @@ def wall_works(scene, answer):
         kept = np.isfinite(own) & np.isfinite(work)
         scale = max(total.max(), abs(own[kept]).max(initial=0.0), 1e-300)
         wrong = abs(own - work)[kept].max(initial=0.0)
-        # A wall that stops within a step, at the end of a load, has done half of the work of that step.
-        if wrong > WORK*scale + 2*most and scale > 1e-3*answer.balance["kinetic"].max():
+        # Only a wall that stops within a step, at the end of a load, has done half of the work of that step.
+        stop = 2*most if "load" in acting else 0.0
+        if wrong > WORK*scale + stop and scale > 1e-3*answer.balance["kinetic"].max():
             return f"work of wall {name}: {own[-1]:.4e}, force times displacement {work[-1]:.4e} J/m"
     return ""
 
