@@ -1,30 +1,33 @@
-!> Shares of contacts that act at once between two bodies, where all fixed bodies together count as one: the pieces of a
-!> floor or of a grain, the feet of a table.
+!> Damping of contacts that act at once between two bodies, where all fixed bodies together count as one: the pieces of
+!> a floor or of a grain, the feet of a table.
 !>
-!> A dashpot for a given restitution, c = 2 zeta sqrt(m k), belongs to all contacts of two bodies together. If each of n
-!> equal contacts had it for its own stiffness k, the sum would be sqrt(n) times too strong: a floor that is cut into
-!> five pieces would damp twice as much as the whole one. Contact i gets
+!> A dashpot for a given restitution belongs to all contacts of two bodies together: it damps each mode of their relative
+!> motion with the same ratio (`polydem_contact_modes`), so the answer does not depend on how bodies are cut. A contact
+!> alone has the dashpot of its own point, and is not listed here. Contacts with several free bodies do not share: a body
+!> of the mass M that hits n free bodies of the mass m at once has the damping ratio zeta sqrt((M + n m)/(M + m)).
 !>
-!>     c_i = 2 zeta sqrt(m k_i s_i),     s_i = k_i/sum_j k_j (n_i . n_j)^2,
+!> A mode is that of the present stiffness, but the stiffness changes with the depth. For one contact of the conservative
+!> law damping by the present stiffness gives the restitution exactly. So it does for several, if k is the square of
+!> their force over twice their energy. The springs have more where no rigid displacement d gives all forces at once,
+!> k_i J_i d /= f_i, as for a corner on many pieces; hence the factor
 !>
-!> where the sum runs over all contacts of the same two bodies. Then the sum of all c_i is 2 zeta sqrt(m k) for the
-!> stiffness k of all, however the bodies are cut, and a contact alone, or one among others in perpendicular directions,
-!> has the share 1. This is c_i = 2 zeta k_i/w_i, where w_i^2 is the Rayleigh quotient of the stiffness of all these
-!> contacts for the translation along n_i. It is exact for parallel contacts. For two equal contacts whose normals make
-!> the angle a, an impact along their bisector has the damping ratio zeta sqrt((1 + cos a)/(1 + cos(a)^2)), at most
-!> 1.10 zeta. Contacts with several free bodies do not share: a body of the mass M that hits n free bodies of the mass m
-!> at once has the damping ratio zeta sqrt((M + n m)/(M + m)).
+!>     r^2 = Q^T K^+ Q/sum_i(f_i^2/k_i) <= 1,     Q = sum_i f_i J_i^T.
 !>
-!> The shares are those of the present step, so nothing is remembered. The overlaps of these contacts are found here,
-!> before the loop over all contacts finds them again.
+!> What walls of different motions have beyond one rigid motion is no motion of two bodies. Each contact damps its own
+!> part of it.
+!>
+!> Nothing is remembered. The overlaps of these contacts are found here, before the loop over all contacts finds them
+!> again.
 module polydem_contact_shares
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
+   use polydem_contact_modes, only: find_modes, modes_t
    use polydem_fill_block, only: fill_block
    use polydem_force_law, only: force_law_t
    use polydem_grow, only: grow
    use polydem_kinds, only: ip, min_parallel_size, wp
+   use polydem_normal_damping, only: find_reaches
    use polydem_pair_list, only: pair_list_t
    implicit none
    private
@@ -36,18 +39,29 @@ module polydem_contact_shares
       integer(ip) :: n = 0_ip
       !> Their indices in the pair list, ascending
       integer(ip), allocatable :: pair(:)
-      !> Square root of the share of each
-      real(wp), allocatable :: root(:)
+      !> Damping force of each over 2 zeta sqrt(E), and its dashpot likewise; 0 for a contact alone
+      real(wp), allocatable :: force(:), dashpot(:)
       !> Group of each: the slot of its free body, or for two free bodies a number above all slots
       integer(ip), allocatable, private :: group(:)
-      !> Ratio L/l of each contact, 0 if the polygons do not overlap, and its direction, (x or y, pair)
-      real(wp), allocatable, private :: ratio(:), direction(:, :)
+      !> Stiffness of each contact over E, 0 if the polygons do not overlap, and the rate at which it closes [m/s]
+      real(wp), allocatable, private :: stiffness(:), rate(:)
+      !> Elastic force of each over E [m]
+      real(wp), allocatable, private :: elastic(:)
+      !> Rate per velocity along x and y [1] and per angular velocity [m] of the free or first body, (3, pair)
+      real(wp), allocatable, private :: row(:, :)
+      !> Mobility of this body relative to the other one, (3, 3, pair) [m/kg, 1/kg, 1/(kg m)]
+      real(wp), allocatable, private :: mobility(:, :, :)
       !> Greatest number of a group
       integer(ip), private :: n_groups = 0_ip
       !> Number of pairs, then of contacts, of each group; 0 between two steps
       integer(ip), allocatable, private :: count_of(:)
-      !> Sums of L/l n n^T over the contacts of each group: xx, xy, yy, (3, group)
-      real(wp), allocatable, private :: tensor(:, :)
+      !> Sums over the contacts of each group: row times stiffness times row, stiffness times rate, and elastic force, (3,
+      !> 5, group); square of the elastic force over stiffness, and the factor of damping, (group)
+      real(wp), allocatable, private :: sums(:, :, :), squares(:), factor(:)
+      !> Modes of each group with several contacts
+      type(modes_t), allocatable, private :: modes(:)
+      !> First contact of each such group
+      integer(ip), allocatable, private :: leader(:)
       !> Group of one free body with each other, (slot); 0 between two bodies
       integer(ip), allocatable, private :: group_with(:)
       !> Remembered edges of the pairs of each block, a copy
@@ -73,7 +87,7 @@ contains
       !$omp parallel do if (shares%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, bodies, pairs, history, shares) private(low)
       do low = 1_ip, shares%n, block_size
-         call find_ratios(law, bodies, pairs, history, low, min(shares%n, low + block_size - 1_ip), shares)
+         call find_rows(law, bodies, pairs, history, low, min(shares%n, low + block_size - 1_ip), shares)
       end do
       !$omp end parallel do
       call divide(shares)
@@ -213,17 +227,18 @@ contains
       b = c
    end subroutine swap
 
-   !> Find ratio and direction of some listed contacts, at most a block.
-   subroutine find_ratios(law, bodies, pairs, history, low, high, shares)
+   !> Find stiffness, row, rate and mobility of some listed contacts, at most a block.
+   subroutine find_rows(law, bodies, pairs, history, low, high, shares)
       type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
       type(pair_list_t), intent(in) :: pairs
       type(contact_history_t), intent(in) :: history
       !> First and last pair of the list
       integer(ip), intent(in) :: low, high
-      !> The list; ratio and direction of these pairs are set
+      !> The list; what belongs to these pairs is set
       type(contact_shares_t), intent(inout) :: shares
       type(contact_block_t) :: block
+      real(wp) :: reach(block_size)
       integer(ip) :: first(block_size), second(block_size), c, k, n, next, tested
 
       n = high - low + 1_ip
@@ -231,7 +246,7 @@ contains
          first(c) = pairs%first(shares%pair(low + c - 1_ip))
          second(c) = pairs%second(shares%pair(low + c - 1_ip))
       end do
-      shares%ratio(low:high) = 0.0_wp
+      shares%stiffness(low:high) = 0.0_wp
       next = n
       tested = n + 1_ip
       associate (mine => shares%mine((low - 1_ip)/block_size + 1_ip))
@@ -246,55 +261,117 @@ contains
             call fill_block(bodies, first(:n), second(:n), law%overlap_measure, 1_ip, next, tested, mine, &
                          block)
             call law%apply_elastic(bodies, block, mine)
+            call find_reaches(block, reach)
             do c = 1_ip, block%n
                k = low + block%pair(c) - 1_ip
-               shares%ratio(k) = block%length(c)*block%inverse_length(c)
-               shares%direction(:, k) = block%direction(c, :)
+               shares%stiffness(k) = reach(c)*block%inverse_length(c)
+               shares%rate(k) = block%rate(c)/reach(c)
+               shares%elastic(k) = block%elastic(c)/law%pairs%stiffness%one
+               if (bodies%fixed(block%first(c))) then
+                  shares%row(:, k) = [-block%normal(c, :), -block%moment(c, 2)]/reach(c)
+                  shares%mobility(:, :, k) = mobility_of(bodies, block%second(c))
+               else
+                  shares%row(:, k) = [block%normal(c, :), block%moment(c, 1)]/reach(c)
+                  shares%mobility(:, :, k) = mobility_of(bodies, block%first(c))
+                  if (.not. bodies%fixed(block%second(c))) shares%mobility(:, :, k) = shares%mobility(:, :, k) &
+                     + mobility_of(bodies, block%second(c), block%arm_second(c, :) - block%arm_first(c, :))
+               end if
             end do
          end do
       end associate
-   end subroutine find_ratios
+   end subroutine find_rows
 
-   !> Compute the shares from the ratios and directions of all listed contacts.
+   !> Mobility of a point that is fixed to a body: velocities along x and y and angular velocity per impulses, (3, 3)
+   pure function mobility_of(bodies, s, place) result(mobility)
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Place of the point relative to the centre [m]; default: the centre
+      real(wp), intent(in), optional :: place(2)
+      real(wp) :: mobility(3, 3), lever(3)
+
+      mobility = 0.0_wp
+      mobility(1, 1) = bodies%inverse_mass(s)
+      mobility(2, 2) = bodies%inverse_mass(s)
+      lever = [0.0_wp, 0.0_wp, 1.0_wp]
+      if (present(place)) lever(1:2) = [-place(2), place(1)]
+      mobility = mobility + bodies%inverse_inertia(s)*spread(lever, 2, 3)*spread(lever, 1, 3)
+   end function mobility_of
+
+   !> Compute the damping from the rows of all listed contacts.
    subroutine divide(shares)
       type(contact_shares_t), intent(inout) :: shares
-      integer(ip) :: k
-      real(wp) :: whole
+      integer(ip) :: k, n
 
       do k = 1_ip, shares%n
-         shares%tensor(:, shares%group(k)) = 0.0_wp
+         shares%sums(:, :, shares%group(k)) = 0.0_wp
+         shares%squares(shares%group(k)) = 0.0_wp
       end do
+      n = 0_ip
       do k = 1_ip, shares%n
-         associate (t => shares%tensor(:, shares%group(k)), n => shares%direction(:, k), r => shares%ratio(k))
-            if (.not. r > 0.0_wp) cycle
-            t = t + r*[n(1)*n(1), n(1)*n(2), n(2)*n(2)]
+         associate (sums => shares%sums(:, :, shares%group(k)), row => shares%row(:, k), &
+                    squares => shares%squares(shares%group(k)), n_contacts => shares%count_of(shares%group(k)))
+            if (.not. shares%stiffness(k) > 0.0_wp) cycle
+            sums(:, :3) = sums(:, :3) + shares%stiffness(k)*spread(row, 2, 3)*spread(row, 1, 3)
+            sums(:, 4) = sums(:, 4) + shares%stiffness(k)*shares%rate(k)*row
+            sums(:, 5) = sums(:, 5) + shares%elastic(k)*row
+            squares = squares + shares%elastic(k)**2/shares%stiffness(k)
+            n_contacts = n_contacts + 1_ip
+            if (n_contacts /= 2_ip) cycle
+            n = n + 1_ip
+            shares%leader(n) = k
          end associate
-         shares%count_of(shares%group(k)) = shares%count_of(shares%group(k)) + 1_ip
       end do
-      do k = 1_ip, shares%n
-         shares%root(k) = 1.0_wp
-         associate (t => shares%tensor(:, shares%group(k)), n => shares%direction(:, k), r => shares%ratio(k))
-            ! A contact alone has exactly 1, however many pairs the boxes make: no bit depends on the boxes.
-            if (.not. r > 0.0_wp .or. shares%count_of(shares%group(k)) < 2_ip) cycle
-            whole = n(1)*n(1)*t(1) + 2.0_wp*n(1)*n(2)*t(2) + n(2)*n(2)*t(3)
-            shares%root(k) = sqrt(min(1.0_wp, r/whole))
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(n, shares) private(k)
+      do k = 1_ip, n
+         associate (leader => shares%leader(k), group => shares%group(shares%leader(k)))
+            call find_modes(shares%mobility(:, :, leader), shares%sums(:, :3, group), shares%modes(group))
+            shares%factor(group) = 1.0_wp
+            if (shares%squares(group) > 0.0_wp) shares%factor(group) = sqrt(min(1.0_wp, dot_product( &
+               shares%sums(:, 5, group), matmul(shares%modes(group)%compliance, shares%sums(:, 5, group))) &
+               /shares%squares(group)))
          end associate
+      end do
+      !$omp end parallel do
+      do k = 1_ip, shares%n
+         shares%force(k) = 0.0_wp
+         shares%dashpot(k) = 0.0_wp
+         ! A contact alone is not shared, however many pairs the boxes make: no bit depends on the boxes.
+         if (shares%stiffness(k) > 0.0_wp .and. shares%count_of(shares%group(k)) > 1_ip) call damp(k, shares)
       end do
       do k = 1_ip, shares%n
          shares%count_of(shares%group(k)) = 0_ip
       end do
    end subroutine divide
 
-   !> Set the shares of a block of contacts: 1 for those that are not listed.
+   !> Set force and dashpot of one of several contacts.
+   pure subroutine damp(k, shares)
+      !> Index in the list
+      integer(ip), intent(in) :: k
+      type(contact_shares_t), intent(inout) :: shares
+      real(wp) :: of_modes, rest
+
+      associate (modes => shares%modes(shares%group(k)), impulse => shares%sums(:, 4, shares%group(k)), &
+                 factor => shares%factor(shares%group(k)), row => shares%row(:, k))
+         of_modes = dot_product(row, matmul(modes%damping, impulse))
+         rest = shares%rate(k) - dot_product(row, matmul(modes%compliance, impulse))
+         shares%dashpot(k) = factor*shares%stiffness(k)*dot_product(row, matmul(modes%mobility, row)) &
+            /dot_product(row, matmul(shares%mobility(:, :, k), row))
+         shares%force(k) = factor*shares%stiffness(k)*of_modes + shares%dashpot(k)*rest
+      end associate
+   end subroutine damp
+
+   !> Set the shares of a block of contacts: 0 for those that are alone.
    pure subroutine set_shares(shares, cursor, block)
       type(contact_shares_t), intent(in) :: shares
       !> Listed pairs up to this one are lower than all pairs of the blocks so far
       integer(ip), intent(inout) :: cursor
-      !> Contacts in descending order of their pairs; `share_root` is set
+      !> Contacts in descending order of their pairs; `shared_force` and `shared_dashpot` are set
       type(contact_block_t), intent(inout) :: block
       integer(ip) :: c
 
-      block%share_root(:block%n) = 1.0_wp
+      block%shared_force(:block%n) = 0.0_wp
+      block%shared_dashpot(:block%n) = 0.0_wp
       c = 1_ip
       do while (cursor > 0_ip .and. c <= block%n)
          associate (p => shares%pair(cursor))
@@ -302,7 +379,10 @@ contains
             do while (block%pair(c) > p)
                c = c + 1_ip
             end do
-            if (block%pair(c) == p) block%share_root(c) = shares%root(cursor)
+            if (block%pair(c) == p) then
+               block%shared_force(c) = shares%force(cursor)
+               block%shared_dashpot(c) = shares%dashpot(cursor)
+            end if
          end associate
          cursor = cursor - 1_ip
       end do
@@ -330,10 +410,11 @@ contains
       if (allocated(shares%count_of)) then
          if (size(shares%count_of) >= n) return
          room = max(2_ip*size(shares%count_of, kind=ip), n)
-         deallocate (shares%count_of, shares%tensor)
+         deallocate (shares%count_of, shares%sums, shares%squares, shares%factor, shares%modes, &
+                     shares%leader)
       end if
       allocate (shares%count_of(room), source=0_ip)
-      allocate (shares%tensor(3, room))
+      allocate (shares%sums(3, 5, room), shares%squares(room), shares%factor(room), shares%modes(room), shares%leader(room))
    end subroutine reserve_groups
 
    !> Make room for n pairs.
@@ -348,8 +429,12 @@ contains
       room = max(2_ip*room, n)
       call grow(shares%pair, shares%n, room)
       call grow(shares%group, shares%n, room)
-      if (allocated(shares%root)) deallocate (shares%root, shares%ratio, shares%direction, shares%mine)
-      allocate (shares%root(room), shares%ratio(room), shares%direction(2, room))
+      if (allocated(shares%force)) &
+         deallocate (shares%force, shares%dashpot, shares%stiffness, shares%rate, shares%elastic, shares%row, &
+                     shares%mobility, shares%mine)
+      allocate (shares%force(room), shares%dashpot(room), shares%stiffness(room), shares%rate(room), &
+                shares%elastic(room))
+      allocate (shares%row(3, room), shares%mobility(3, 3, room))
       allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
       do k = 1_ip, size(shares%mine, kind=ip)
          allocate (shares%mine(k)%features(block_size))

@@ -45,6 +45,8 @@ module polydem_contact_block
       real(wp) :: angular_velocity(block_size, 2)
       !> Sum of the reciprocal masses [m/kg]
       real(wp) :: mobility(block_size)
+      !> Reciprocal moments of inertia, (contact, body) [1/(kg m)]
+      real(wp) :: inverse_inertia(block_size, 2)
       !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
       !> materials to that of the law if materials differ [1/m]
       real(wp) :: inverse_length(block_size)
@@ -56,9 +58,10 @@ module polydem_contact_block
       real(wp) :: cohesion(block_size)
       !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
       real(wp) :: normal_force(block_size)
-      !> Square root of the share of the contact in the stiffness of all contacts between the same two bodies, where
-      !> fixed bodies count as one; set only if the force law needs shares [1]
-      real(wp) :: share_root(block_size)
+      !> Of one of several contacts between the same two bodies, where fixed bodies count as one: its normal damping force
+      !> over 2 zeta sqrt(E) [sqrt(N) m/s], and the same per normal velocity; 0 for a contact alone. Set only if the force law
+      !> needs shares
+      real(wp) :: shared_force(block_size), shared_dashpot(block_size)
       !> Normal damping force per normal velocity, before its limit; set only if tilts are damped [N s/m2]
       real(wp) :: dashpot(block_size)
       !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
@@ -82,7 +85,7 @@ contains
    !> Copy velocities, masses and materials of the bodies to the contacts of a block.
    pure subroutine copy_motion(bodies, block)
       type(bodies_t), intent(in) :: bodies
-      !> Contacts; `velocity_first` to `mobility`, and `material`, are set
+      !> Contacts; `velocity_first` to `inverse_inertia`, and `material`, are set
       type(contact_block_t), intent(inout) :: block
       integer(ip) :: c, i, j
 
@@ -96,6 +99,8 @@ contains
          block%angular_velocity(c, 1) = bodies%angular_velocity(i)
          block%angular_velocity(c, 2) = bodies%angular_velocity(j)
          block%mobility(c) = bodies%inverse_mass(i) + bodies%inverse_mass(j)
+         block%inverse_inertia(c, 1) = bodies%inverse_inertia(i)
+         block%inverse_inertia(c, 2) = bodies%inverse_inertia(j)
       end do
       if (.not. allocated(bodies%material)) return
       do c = 1_ip, block%n

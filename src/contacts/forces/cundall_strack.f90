@@ -119,7 +119,7 @@ contains
          end if
       end associate
       if (self%damping > 0.0_wp) then
-         call find_dashpots(self, bodies%n, bodies%inverse_inertia, block, root)
+         call find_dashpots(self, block, root)
          call self%root_factor%scale(block%n, block%material, root)
          do c = 1_ip, block%n
             limit = self%coefficient%one*max(0.0_wp, load(c))
@@ -215,25 +215,17 @@ contains
    end subroutine find_midstep_slip
 
    !> Dashpots d sqrt(k_t m_t) of all contacts [N s/m2]
-   pure subroutine find_dashpots(self, n, inverse_inertia, block, dashpot)
+   pure subroutine find_dashpots(self, block, dashpot)
       class(cundall_strack_t), intent(in) :: self
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      !> Their inverse moments of inertia [1/(kg m)]
-      real(wp), intent(in) :: inverse_inertia(n)
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: dashpot(block_size)
-      real(wp) :: inverse(block_size, 2), square_first, square_second, mobility
+      real(wp) :: square_first, square_second, mobility
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         inverse(c, 1) = inverse_inertia(block%first(c))
-         inverse(c, 2) = inverse_inertia(block%second(c))
-      end do
-      do c = 1_ip, block%n
          square_first = block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2
          square_second = block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2
-         mobility = block%mobility(c) + (square_first*inverse(c, 1) + square_second*inverse(c, 2))
+         mobility = block%mobility(c) + (square_first*block%inverse_inertia(c, 1) + square_second*block%inverse_inertia(c, 2))
          dashpot(c) = self%damping*sqrt(self%stiffness%one/mobility)
       end do
    end subroutine find_dashpots

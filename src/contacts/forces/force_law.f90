@@ -137,6 +137,7 @@ contains
          end associate
       end if
       do k = 1, size(law%parts)
+         law%parts(k)%part%friction_column = column_of_friction(law%history_kinds)
          associate (part => law%parts(k)%part)
             if (part%needs_cohesion .and. (.not. part%cohesion_has_energy .or. law%overlap_measure%power > 0.0_wp)) &
                law%energy_is_known = .false.
@@ -144,6 +145,15 @@ contains
       end do
       law%description = trim(adjustl(law%description))
    end subroutine collect_needs
+
+   !> Column of the contact history with the force of friction of the last step; 0 if there is none
+   pure integer function column_of_friction(kinds) result(column)
+      type(history_kind_t), intent(in) :: kinds(:)
+
+      do column = size(kinds), 1, -1
+         if (kinds(column)%name == 'tangential') exit
+      end do
+   end function column_of_friction
 
    !> Let the parts measure the bodies.
    subroutine measure(law, bodies)

@@ -54,6 +54,8 @@ module polydem_force_part
       logical :: needs_twist = .false.
       !> Whether it needs the shares of contacts between the same two bodies
       logical :: needs_shares = .false.
+      !> Column of the contact history with the force of friction of the last step; 0 if there is none
+      integer :: friction_column = 0
       !> Whether it needs the accelerations of the last step
       logical :: needs_accelerations = .false.
       !> Whether the energy of its elastic force is half of elastic area/length

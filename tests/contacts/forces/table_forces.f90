@@ -56,7 +56,8 @@ contains
       do high = contacts%n, 1_ip, -block_size
          call load_block(bodies, contacts, high, block)
          call copy_motion(bodies, block)
-         block%share_root = 1.0_wp
+         block%shared_force = 0.0_wp
+         block%shared_dashpot = 0.0_wp
          if (present(dashpot)) block%dashpot = dashpot
          if (present(law)) call law%apply(bodies, dt, block, history)
          if (present(part)) call part%add(bodies, dt, block, history)

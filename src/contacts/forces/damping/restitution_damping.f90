@@ -1,5 +1,7 @@
 !> Normal damping for a given restitution: F = 2 zeta sqrt(m_eff k) v_n, where k = E L/l is the present stiffness of the
-!> contact and v_n = (dA/dt)/L.
+!> contact and v_n = (dA/dt)/L. The effective mass m_eff is that of the contact point: 1/m_eff is the sum of 1/m + r^2/I
+!> over both bodies, r being the lever of the normal force. Several contacts between the same two bodies are damped
+!> together (`polydem_contact_modes`).
 !>
 !> A flat contact has a constant k. It is a damped spring that is released when its force vanishes (no attraction). Its
 !> restitution depends on the damping ratio zeta alone (T. Schwager & T. Poeschel, Granular Matter 9 (2007) 465):
@@ -10,10 +12,12 @@
 !> It does not depend on the sizes and masses of the two bodies. With the conservative law every central contact has
 !> this restitution: F = K A A' and k = K A'^2 with A' = dA/dd, so dv/dA is the same function of A and v for any A(d).
 !> With the area law, contacts that are not flat have another restitution. It does not depend on the speed either,
-!> because k follows the depth (Y. Tsuji, T. Tanaka & T. Ishida, Powder Technol. 71 (1992) 239). The effective mass is
-!> that of a central impact; eccentric impacts lose more energy.
+!> because k follows the depth (Y. Tsuji, T. Tanaka & T. Ishida, Powder Technol. 71 (1992) 239). Eccentric impacts
+!> without friction have the same restitution at the contact point. Friction changes the mass against approach.
 module polydem_restitution_damping
+   use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
@@ -28,8 +32,7 @@ module polydem_restitution_damping
    type, extends(normal_damping_t) :: restitution_damping_t
    contains
       procedure :: configure
-      procedure :: find_forces
-      procedure :: find_dashpots
+      procedure :: add
       procedure :: stiffen
    end type restitution_damping_t
 
@@ -56,35 +59,81 @@ contains
       self%is_weak = pairs%restitution%greatest() > weak_restitution
    end subroutine configure
 
-   !> Compute the damping forces of one block of contacts.
-   subroutine find_forces(self, block, force)
+   !> Add the damping forces of one block of contacts.
+   subroutine add(self, bodies, dt, block, history)
       class(restitution_damping_t), intent(in) :: self
-      type(contact_block_t), intent(in) :: block
-      real(wp), intent(inout) :: force(block_size)
-      real(wp) :: reach(block_size)
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in) :: dt
+      !> Contacts; `normal_force` changes
+      type(contact_block_t), intent(inout) :: block
+      !> Contact history; the force of friction is read
+      type(contact_history_t), intent(inout) :: history
+      real(wp) :: reach(block_size), mobility(block_size), force(block_size), factor
       integer(ip) :: c
 
+      associate (unused_bodies => bodies, unused_dt => dt)
+      end associate
       call find_reaches(block, reach)
+      call find_mobilities(block, reach, mobility)
+      factor = 2.0_wp*self%coefficient%one*sqrt(self%stiffness)
+      if (self%friction_column > 0) &
+         call include_friction(factor, block, reach, history%column(self%friction_column)%value, mobility)
       do c = 1_ip, block%n
-         force(c) = 2.0_wp*self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
-            *sqrt(block%inverse_length(c)/reach(c))*block%rate(c)*block%share_root(c)
+         force(c) = factor*merge(block%shared_force(c), sqrt(block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c), &
+                                 block%shared_dashpot(c) > 0.0_wp)
       end do
-   end subroutine find_forces
+      call self%coefficient%scale(block%n, block%material, force)
+      call self%add_limited(force, block)
+      if (.not. self%fills_dashpots) return
+      do c = 1_ip, block%n
+         block%dashpot(c) = factor*(block%length(c)/reach(c))*merge(block%shared_dashpot(c), &
+            sqrt(reach(c)*block%inverse_length(c)/mobility(c)), block%shared_dashpot(c) > 0.0_wp)
+      end do
+      call self%coefficient%scale(block%n, block%material, block%dashpot)
+   end subroutine add
 
-   !> Find the dashpots 2 zeta sqrt(m k) of one block of contacts.
-   subroutine find_dashpots(self, block, dashpot)
-      class(restitution_damping_t), intent(in) :: self
+   !> Mobility of the point of each contact along its normal: 1/m + r^2/I of both bodies, r being the lever of the normal
+   !> force [m/kg]
+   pure subroutine find_mobilities(block, reach, mobility)
       type(contact_block_t), intent(in) :: block
-      real(wp), intent(inout) :: dashpot(block_size)
-      real(wp) :: reach(block_size)
+      !> Lengths by which the gradients of the areas are divided [m]
+      real(wp), intent(in) :: reach(block_size)
+      real(wp), intent(inout) :: mobility(block_size)
+      real(wp) :: first, second
       integer(ip) :: c
 
-      call find_reaches(block, reach)
       do c = 1_ip, block%n
-         dashpot(c) = 2.0_wp*self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
-            *sqrt(block%inverse_length(c)/reach(c))*(block%length(c)*block%share_root(c))
+         first = block%moment(c, 1)/reach(c)
+         second = block%moment(c, 2)/reach(c)
+         mobility(c) = block%mobility(c) &
+            + (first*first*block%inverse_inertia(c, 1) + second*second*block%inverse_inertia(c, 2))
       end do
-   end subroutine find_dashpots
+   end subroutine find_mobilities
+
+   !> Add to the mobilities what friction does to the approach: its force of the last step over the present normal force,
+   !> times the mobility between the directions of both.
+   pure subroutine include_friction(factor, block, reach, friction, mobility)
+      !> 2 zeta sqrt(E)
+      real(wp), intent(in) :: factor
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(in) :: reach(block_size)
+      !> Force of friction on the first body at the last step, (pair) [N/m]
+      real(wp), intent(in), contiguous :: friction(:)
+      real(wp), intent(inout) :: mobility(block_size)
+      real(wp) :: cross, first, second, load
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         first = block%direction(c, 1)*block%arm_first(c, 1) + block%direction(c, 2)*block%arm_first(c, 2)
+         second = block%direction(c, 1)*block%arm_second(c, 1) + block%direction(c, 2)*block%arm_second(c, 2)
+         cross = (block%moment(c, 1)*first*block%inverse_inertia(c, 1) &
+                  + block%moment(c, 2)*second*block%inverse_inertia(c, 2))/reach(c)
+         load = block%elastic(c) + max(-block%elastic(c), &
+                                       factor*sqrt(block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c))
+         cross = friction(block%pair(c))*cross/max(load, tiny(load))
+         mobility(c) = max(0.5_wp*mobility(c), min(2.0_wp*mobility(c), mobility(c) - cross))
+      end do
+   end subroutine include_friction
 
    !> Add the dashpot 2 zeta sqrt(m k).
    subroutine stiffen(self, element)
