@@ -1,28 +1,17 @@
 !> Damping of contacts that act at once between two bodies, where all fixed bodies together count as one: the pieces of
 !> a floor or of a grain, the feet of a table.
 !>
-!> A dashpot for a given restitution belongs to all contacts of two bodies together: it damps each mode of their relative
-!> motion with the same ratio (`polydem_contact_modes`), so the answer does not depend on how bodies are cut. A contact
-!> alone has the dashpot of its own point, and is not listed here. Contacts with several free bodies do not share: a body
-!> of the mass M that hits n free bodies of the mass m at once has the damping ratio zeta sqrt((M + n m)/(M + m)).
+!> A dashpot for a given restitution belongs to all contacts of two bodies together (`polydem_contact_modes`), so the
+!> answer does not depend on how bodies are cut. A contact alone has that of its own point, and no share. Contacts with
+!> several free bodies do not share: a body of the mass M that hits n free bodies of the mass m at once has the damping
+!> ratio zeta sqrt((M + n m)/(M + m)).
 !>
-!> A mode is that of the present stiffness, but the stiffness changes with the depth. For one contact of the conservative
-!> law damping by the present stiffness gives the restitution exactly. So it does for several, if k is the square of
-!> their force over twice their energy. The springs have more where no rigid displacement d gives all forces at once,
-!> k_i J_i d /= f_i, as for a corner on many pieces; hence the factor
-!>
-!>     r^2 = Q^T K^+ Q/sum_i(f_i^2/k_i) <= 1,     Q = sum_i f_i J_i^T.
-!>
-!> What walls of different motions have beyond one rigid motion is no motion of two bodies. Each contact damps its own
-!> part of it.
-!>
-!> Nothing is remembered. The overlaps of these contacts are found here, before the loop over all contacts finds them
-!> again.
+!> Nothing is remembered. The overlaps of these contacts are found here, and again in the loop over all contacts.
 module polydem_contact_shares
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contact_modes, only: find_modes, modes_t
+   use polydem_contact_modes, only: add_spring, find_damping, find_modes, modes_t, spring_sums_t, spring_t
    use polydem_fill_block, only: fill_block
    use polydem_force_law, only: force_law_t
    use polydem_grow, only: grow
@@ -43,24 +32,16 @@ module polydem_contact_shares
       real(wp), allocatable :: force(:), dashpot(:)
       !> Group of each: the slot of its free body, or for two free bodies a number above all slots
       integer(ip), allocatable, private :: group(:)
-      !> Stiffness of each contact over E, 0 if the polygons do not overlap, and the rate at which it closes [m/s]
-      real(wp), allocatable, private :: stiffness(:), rate(:)
-      !> Elastic force of each over E [m]
-      real(wp), allocatable, private :: elastic(:)
-      !> Rate per velocity along x and y [1] and per angular velocity [m] of the free or first body, (3, pair)
-      real(wp), allocatable, private :: row(:, :)
-      !> Mobility of this body relative to the other one, (3, 3, pair) [m/kg, 1/kg, 1/(kg m)]
-      real(wp), allocatable, private :: mobility(:, :, :)
+      !> The contact of each
+      type(spring_t), allocatable, private :: spring(:)
       !> Greatest number of a group
       integer(ip), private :: n_groups = 0_ip
-      !> Number of pairs, then of contacts, of each group; 0 between two steps
+      !> Number of pairs of each group; 0 between two steps, (group)
       integer(ip), allocatable, private :: count_of(:)
-      !> Sums over the contacts of each group: row times stiffness times row, stiffness times rate, and elastic force, (3,
-      !> 5, group); square of the elastic force over stiffness, and the factor of damping, (group)
-      real(wp), allocatable, private :: sums(:, :, :), squares(:), factor(:)
-      !> Modes of each group with several contacts
+      !> Sums over the contacts of each group, and the modes of those with several, (group)
+      type(spring_sums_t), allocatable, private :: sums(:)
       type(modes_t), allocatable, private :: modes(:)
-      !> First contact of each such group
+      !> Second contact of each such group
       integer(ip), allocatable, private :: leader(:)
       !> Group of one free body with each other, (slot); 0 between two bodies
       integer(ip), allocatable, private :: group_with(:)
@@ -87,7 +68,7 @@ contains
       !$omp parallel do if (shares%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, bodies, pairs, history, shares) private(low)
       do low = 1_ip, shares%n, block_size
-         call find_rows(law, bodies, pairs, history, low, min(shares%n, low + block_size - 1_ip), shares)
+         call find_springs(law, bodies, pairs, history, low, min(shares%n, low + block_size - 1_ip), shares)
       end do
       !$omp end parallel do
       call divide(shares)
@@ -209,7 +190,7 @@ contains
          n = n + 1_ip
          shares%pair(n) = shares%pair(k)
          ! Exchanged, not overwritten: the counts of all groups are still to be cleared.
-         if (n < k) call swap(shares%group(n), shares%group(k))
+         if (n < k) shares%group([n, k]) = shares%group([k, n])
       end do
       shares%n = n
       do k = 1_ip, n_all
@@ -217,18 +198,8 @@ contains
       end do
    end subroutine keep_several
 
-   !> Exchange two numbers.
-   elemental subroutine swap(a, b)
-      integer(ip), intent(inout) :: a, b
-      integer(ip) :: c
-
-      c = a
-      a = b
-      b = c
-   end subroutine swap
-
-   !> Find stiffness, row, rate and mobility of some listed contacts, at most a block.
-   subroutine find_rows(law, bodies, pairs, history, low, high, shares)
+   !> Find some listed contacts, at most a block.
+   subroutine find_springs(law, bodies, pairs, history, low, high, shares)
       type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
       type(pair_list_t), intent(in) :: pairs
@@ -239,14 +210,14 @@ contains
       type(contact_shares_t), intent(inout) :: shares
       type(contact_block_t) :: block
       real(wp) :: reach(block_size)
-      integer(ip) :: first(block_size), second(block_size), c, k, n, next, tested
+      integer(ip) :: first(block_size), second(block_size), c, n, next, tested
 
       n = high - low + 1_ip
       do c = 1_ip, n
          first(c) = pairs%first(shares%pair(low + c - 1_ip))
          second(c) = pairs%second(shares%pair(low + c - 1_ip))
       end do
-      shares%stiffness(low:high) = 0.0_wp
+      shares%spring(low:high)%stiffness = 0.0_wp
       next = n
       tested = n + 1_ip
       associate (mine => shares%mine((low - 1_ip)/block_size + 1_ip))
@@ -258,108 +229,91 @@ contains
             mine%features(:n) = 0_ip
          end if
          do while (next >= 1_ip)
-            call fill_block(bodies, first(:n), second(:n), law%overlap_measure, 1_ip, next, tested, mine, &
-                         block)
+            call fill_block(bodies, first(:n), second(:n), law%overlap_measure, 1_ip, next, tested, mine, block)
             call law%apply_elastic(bodies, block, mine)
             call find_reaches(block, reach)
             do c = 1_ip, block%n
-               k = low + block%pair(c) - 1_ip
-               shares%stiffness(k) = reach(c)*block%inverse_length(c)
-               shares%rate(k) = block%rate(c)/reach(c)
-               shares%elastic(k) = block%elastic(c)/law%pairs%stiffness%one
-               if (bodies%fixed(block%first(c))) then
-                  shares%row(:, k) = [-block%normal(c, :), -block%moment(c, 2)]/reach(c)
-                  shares%mobility(:, :, k) = mobility_of(bodies, block%second(c))
-               else
-                  shares%row(:, k) = [block%normal(c, :), block%moment(c, 1)]/reach(c)
-                  shares%mobility(:, :, k) = mobility_of(bodies, block%first(c))
-                  if (.not. bodies%fixed(block%second(c))) shares%mobility(:, :, k) = shares%mobility(:, :, k) &
-                     + mobility_of(bodies, block%second(c), block%arm_second(c, :) - block%arm_first(c, :))
-               end if
+               shares%spring(low + block%pair(c) - 1_ip) = spring_of(bodies, block, c, reach(c), &
+                                                                     law%pairs%stiffness%one)
             end do
          end do
       end associate
-   end subroutine find_rows
+   end subroutine find_springs
+
+   !> A contact as the spring of a free body, the first one of two
+   pure function spring_of(bodies, block, c, reach, stiffness) result(spring)
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+      !> Length by which the gradient of the area is divided [m]
+      real(wp), intent(in) :: reach
+      !> Stiffness E of the law [N/m2]
+      real(wp), intent(in) :: stiffness
+      type(spring_t) :: spring
+
+      spring%stiffness = reach*block%inverse_length(c)
+      spring%rate = block%rate(c)/reach
+      spring%elastic = block%elastic(c)/stiffness
+      if (bodies%fixed(block%first(c))) then
+         spring%row = [-block%normal(c, :), -block%moment(c, 2)]/reach
+         spring%mobility = mobility_of(bodies, block%second(c), [0.0_wp, 0.0_wp])
+      else
+         spring%row = [block%normal(c, :), block%moment(c, 1)]/reach
+         spring%mobility = mobility_of(bodies, block%first(c), [0.0_wp, 0.0_wp])
+         if (.not. bodies%fixed(block%second(c))) spring%mobility = spring%mobility &
+            + mobility_of(bodies, block%second(c), block%arm_second(c, :) - block%arm_first(c, :))
+      end if
+   end function spring_of
 
    !> Mobility of a point that is fixed to a body: velocities along x and y and angular velocity per impulses, (3, 3)
    pure function mobility_of(bodies, s, place) result(mobility)
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body
       integer(ip), intent(in) :: s
-      !> Place of the point relative to the centre [m]; default: the centre
-      real(wp), intent(in), optional :: place(2)
+      !> Place of the point relative to the centre [m]
+      real(wp), intent(in) :: place(2)
       real(wp) :: mobility(3, 3), lever(3)
 
-      mobility = 0.0_wp
-      mobility(1, 1) = bodies%inverse_mass(s)
-      mobility(2, 2) = bodies%inverse_mass(s)
-      lever = [0.0_wp, 0.0_wp, 1.0_wp]
-      if (present(place)) lever(1:2) = [-place(2), place(1)]
-      mobility = mobility + bodies%inverse_inertia(s)*spread(lever, 2, 3)*spread(lever, 1, 3)
+      lever = [-place(2), place(1), 1.0_wp]
+      mobility = bodies%inverse_inertia(s)*spread(lever, 2, 3)*spread(lever, 1, 3)
+      mobility(1, 1) = mobility(1, 1) + bodies%inverse_mass(s)
+      mobility(2, 2) = mobility(2, 2) + bodies%inverse_mass(s)
    end function mobility_of
 
-   !> Compute the damping from the rows of all listed contacts.
+   !> Compute the damping of all listed contacts.
    subroutine divide(shares)
       type(contact_shares_t), intent(inout) :: shares
       integer(ip) :: k, n
 
       do k = 1_ip, shares%n
-         shares%sums(:, :, shares%group(k)) = 0.0_wp
-         shares%squares(shares%group(k)) = 0.0_wp
+         shares%sums(shares%group(k)) = spring_sums_t()
       end do
       n = 0_ip
       do k = 1_ip, shares%n
-         associate (sums => shares%sums(:, :, shares%group(k)), row => shares%row(:, k), &
-                    squares => shares%squares(shares%group(k)), n_contacts => shares%count_of(shares%group(k)))
-            if (.not. shares%stiffness(k) > 0.0_wp) cycle
-            sums(:, :3) = sums(:, :3) + shares%stiffness(k)*spread(row, 2, 3)*spread(row, 1, 3)
-            sums(:, 4) = sums(:, 4) + shares%stiffness(k)*shares%rate(k)*row
-            sums(:, 5) = sums(:, 5) + shares%elastic(k)*row
-            squares = squares + shares%elastic(k)**2/shares%stiffness(k)
-            n_contacts = n_contacts + 1_ip
-            if (n_contacts /= 2_ip) cycle
-            n = n + 1_ip
-            shares%leader(n) = k
-         end associate
+         if (.not. shares%spring(k)%stiffness > 0.0_wp) cycle
+         call add_spring(shares%spring(k), shares%sums(shares%group(k)))
+         if (shares%sums(shares%group(k))%n /= 2_ip) cycle
+         n = n + 1_ip
+         shares%leader(n) = k
       end do
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(n, shares) private(k)
       do k = 1_ip, n
-         associate (leader => shares%leader(k), group => shares%group(shares%leader(k)))
-            call find_modes(shares%mobility(:, :, leader), shares%sums(:, :3, group), shares%modes(group))
-            shares%factor(group) = 1.0_wp
-            if (shares%squares(group) > 0.0_wp) shares%factor(group) = sqrt(min(1.0_wp, dot_product( &
-               shares%sums(:, 5, group), matmul(shares%modes(group)%compliance, shares%sums(:, 5, group))) &
-               /shares%squares(group)))
+         associate (leader => shares%leader(k), g => shares%group(shares%leader(k)))
+            call find_modes(shares%spring(leader)%mobility, shares%sums(g), shares%modes(g))
          end associate
       end do
       !$omp end parallel do
       do k = 1_ip, shares%n
          shares%force(k) = 0.0_wp
          shares%dashpot(k) = 0.0_wp
-         ! A contact alone is not shared, however many pairs the boxes make: no bit depends on the boxes.
-         if (shares%stiffness(k) > 0.0_wp .and. shares%count_of(shares%group(k)) > 1_ip) call damp(k, shares)
-      end do
-      do k = 1_ip, shares%n
-         shares%count_of(shares%group(k)) = 0_ip
+         associate (spring => shares%spring(k), sums => shares%sums(shares%group(k)))
+            ! A contact alone is not shared, however many pairs the boxes make: no bit depends on the boxes.
+            if (spring%stiffness > 0.0_wp .and. sums%n > 1_ip) &
+               call find_damping(spring, shares%modes(shares%group(k)), shares%force(k), shares%dashpot(k))
+         end associate
       end do
    end subroutine divide
-
-   !> Set force and dashpot of one of several contacts.
-   pure subroutine damp(k, shares)
-      !> Index in the list
-      integer(ip), intent(in) :: k
-      type(contact_shares_t), intent(inout) :: shares
-      real(wp) :: of_modes, rest
-
-      associate (modes => shares%modes(shares%group(k)), impulse => shares%sums(:, 4, shares%group(k)), &
-                 factor => shares%factor(shares%group(k)), row => shares%row(:, k))
-         of_modes = dot_product(row, matmul(modes%damping, impulse))
-         rest = shares%rate(k) - dot_product(row, matmul(modes%compliance, impulse))
-         shares%dashpot(k) = factor*shares%stiffness(k)*dot_product(row, matmul(modes%mobility, row)) &
-            /dot_product(row, matmul(shares%mobility(:, :, k), row))
-         shares%force(k) = factor*shares%stiffness(k)*of_modes + shares%dashpot(k)*rest
-      end associate
-   end subroutine damp
 
    !> Set the shares of a block of contacts: 0 for those that are alone.
    pure subroutine set_shares(shares, cursor, block)
@@ -410,11 +364,10 @@ contains
       if (allocated(shares%count_of)) then
          if (size(shares%count_of) >= n) return
          room = max(2_ip*size(shares%count_of, kind=ip), n)
-         deallocate (shares%count_of, shares%sums, shares%squares, shares%factor, shares%modes, &
-                     shares%leader)
+         deallocate (shares%count_of, shares%sums, shares%modes, shares%leader)
       end if
       allocate (shares%count_of(room), source=0_ip)
-      allocate (shares%sums(3, 5, room), shares%squares(room), shares%factor(room), shares%modes(room), shares%leader(room))
+      allocate (shares%sums(room), shares%modes(room), shares%leader(room))
    end subroutine reserve_groups
 
    !> Make room for n pairs.
@@ -429,12 +382,8 @@ contains
       room = max(2_ip*room, n)
       call grow(shares%pair, shares%n, room)
       call grow(shares%group, shares%n, room)
-      if (allocated(shares%force)) &
-         deallocate (shares%force, shares%dashpot, shares%stiffness, shares%rate, shares%elastic, shares%row, &
-                     shares%mobility, shares%mine)
-      allocate (shares%force(room), shares%dashpot(room), shares%stiffness(room), shares%rate(room), &
-                shares%elastic(room))
-      allocate (shares%row(3, room), shares%mobility(3, 3, room))
+      if (allocated(shares%force)) deallocate (shares%force, shares%dashpot, shares%spring, shares%mine)
+      allocate (shares%force(room), shares%dashpot(room), shares%spring(room))
       allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
       do k = 1_ip, size(shares%mine, kind=ip)
          allocate (shares%mine(k)%features(block_size))

@@ -225,7 +225,8 @@ contains
       do c = 1_ip, block%n
          square_first = block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2
          square_second = block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2
-         mobility = block%mobility(c) + (square_first*block%inverse_inertia(c, 1) + square_second*block%inverse_inertia(c, 2))
+         mobility = block%mobility(c) &
+            + (square_first*block%inverse_inertia(c, 1) + square_second*block%inverse_inertia(c, 2))
          dashpot(c) = self%damping*sqrt(self%stiffness%one/mobility)
       end do
    end subroutine find_dashpots

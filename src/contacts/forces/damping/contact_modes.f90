@@ -1,34 +1,68 @@
-!> Dashpots of all contacts between two bodies together, from the modes of their relative motion.
+!> Dashpots of all contacts between two bodies together, for one damping ratio of their relative motion.
 !>
 !> The relative motion of two bodies has three components u, velocities along x and y and an angular velocity. With the
 !> mobility Y (3 x 3; the velocities that unit impulses give) and the stiffness K = sum_i k_i J_i^T J_i of contacts that
-!> close at the rates J_i u, the modes of the undamped motion have the frequencies w^2 = eigenvalues of Y K. Damping
-!> with the ratio zeta in each mode is the force 2 zeta D u with
+!> close at the rates v_i = J_i u, a mode of the undamped motion, Y K u = w^2 u, has the damping ratio zeta if every
+!> contact has the dashpot 2 zeta k_i/w (damping in proportion to the stiffness: T.K. Caughey, J. Appl. Mech. 27 (1960)
+!> 269). So the answer does not depend on how bodies are cut. A contact alone has 2 zeta sqrt(k/m') with the mobility
+!> m' = J Y J^T of its point. For a motion of several modes, w is that of Rayleigh's quotient,
 !>
-!>     D = Y^(-1) (Y K)^(1/2) = K X K,     X = C S^(-3/2) C^T,     S = C^T K C,     Y = C C^T
+!>     w^2 = g^T Y g/(u^T K u),     g = K u = sum_i k_i v_i J_i^T,     u = K^+ g,
 !>
-!> (on damping that keeps the modes T.K. Caughey, J. Appl. Mech. 27 (1960) 269). K u is the sum g of k_j J_j^T times the
-!> rate at which contact j closes. So the force of contact i is 2 zeta k_i J_i X g, and the sum over contacts is exact, however the bodies
-!> are cut. A contact alone gets 2 zeta sqrt(k/m') with the mobility m' = J Y J^T of the contact point.
+!> and the ratio of each mode is zeta w_k/w. Every dashpot acts on its own rate, so damping never adds energy, and the
+!> force is 0 where nothing closes.
 !>
-!> Powers of S are those of its positive eigenvalues. Contacts whose normals are nearly parallel hardly hold the bodies
-!> sideways; such a mode could only be damped by great normal forces of both signs. A mode with the share q of the
-!> greatest eigenvalue therefore has the weight (1 + h^2) q^2/(q^2 + h^2) with h = 3e-3: 1/2 if its frequency is a
-!> twentieth of the highest one.
+!> K^+ = C S^+ C^T with S = C^T K C and Y = C C^T. Contacts whose normals are nearly parallel hardly hold the bodies
+!> sideways. A mode with the share q of the greatest eigenvalue of S has the weight (1 + h^2) q^2/(q^2 + h^2) with
+!> h = 3e-3 in K^+: it counts half if its frequency is a twentieth of the highest one. What rates are left beyond u,
+!> these and those of walls with different motions, are damped by each contact for itself.
+!>
+!> The frequency is that of the present stiffness, which changes with the depth. For one contact of the conservative
+!> law, damping by the present stiffness gives the restitution exactly. So it does for several, if k is the square of
+!> their force over twice their energy. The springs have more where no rigid displacement d gives all elastic forces f_i at
+!> once, k_i J_i d /= f_i, as for a corner on many pieces; hence the factor
+!>
+!>     r^2 = Q^T K^+ Q/sum_i(f_i^2/k_i) <= 1,     Q = sum_i f_i J_i^T.
 module polydem_contact_modes
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: modes_t, find_modes
+   public :: spring_t, spring_sums_t, modes_t, add_spring, find_modes, find_damping
 
-   !> What the modes of two bodies make of forces and motions; symmetric, (3, 3)
-   type :: modes_t
-      !> X: velocities over stiffness and frequency, of the damping
-      real(wp) :: damping(3, 3) = 0.0_wp
-      !> C S^(-1) C^T: motion over force, of the springs
-      real(wp) :: compliance(3, 3) = 0.0_wp
-      !> C S^(-1/2) C^T: mobility over frequency
+   !> One of several contacts between two bodies
+   type :: spring_t
+      !> Stiffness over E; 0: there is no contact
+      real(wp) :: stiffness = 0.0_wp
+      !> Rate at which the contact closes [m/s]
+      real(wp) :: rate = 0.0_wp
+      !> Elastic force over E [m]
+      real(wp) :: elastic = 0.0_wp
+      !> Rate J per velocities along x and y [1] and angular velocity [m] of the first body relative to the second
+      real(wp) :: row(3) = 0.0_wp
+      !> Mobility Y of the two bodies for this motion, positive definite [m/kg, 1/kg, 1/(kg m)]
       real(wp) :: mobility(3, 3) = 0.0_wp
+   end type spring_t
+
+   !> Sums over the contacts of two bodies
+   type :: spring_sums_t
+      !> Number of contacts
+      integer(ip) :: n = 0_ip
+      !> Stiffness K, g and Q
+      real(wp) :: stiffness(3, 3) = 0.0_wp, impulse(3) = 0.0_wp, elastic(3) = 0.0_wp
+      !> Sum of the squares of elastic forces over stiffnesses
+      real(wp) :: squares = 0.0_wp
+   end type spring_sums_t
+
+   !> The modes of two bodies
+   type :: modes_t
+      !> K^+: motion over force, (3, 3)
+      real(wp) :: compliance(3, 3) = 0.0_wp
+      !> Mobility over frequency, C S^(-1/2) C^T, (3, 3)
+      real(wp) :: mobility(3, 3) = 0.0_wp
+      !> Relative motion u, of the springs; reciprocal frequency 1/w of this motion, 0 at rest
+      real(wp) :: motion(3) = 0.0_wp, period = 0.0_wp
+      !> The factor r
+      real(wp) :: factor = 1.0_wp
    end type modes_t
 
    !> Square of the share h of the greatest eigenvalue at which a mode has half its weight
@@ -36,26 +70,69 @@ module polydem_contact_modes
 
 contains
 
-   !> Find the modes of the relative motion of two bodies.
-   pure subroutine find_modes(mobility, stiffness, modes)
-      !> Mobility Y, positive definite, and stiffness K, not zero, both symmetric, (3, 3), in consistent units
-      real(wp), intent(in) :: mobility(3, 3), stiffness(3, 3)
+   !> Add a contact to the sums of its bodies.
+   pure subroutine add_spring(spring, sums)
+      type(spring_t), intent(in) :: spring
+      type(spring_sums_t), intent(inout) :: sums
+
+      sums%n = sums%n + 1_ip
+      sums%stiffness = sums%stiffness + spring%stiffness*outer_square(spring%row)
+      sums%impulse = sums%impulse + spring%stiffness*spring%rate*spring%row
+      sums%elastic = sums%elastic + spring%elastic*spring%row
+      sums%squares = sums%squares + spring%elastic**2/spring%stiffness
+   end subroutine add_spring
+
+   !> Find the modes of two bodies.
+   pure subroutine find_modes(mobility, sums, modes)
+      !> Mobility Y of one of the contacts
+      real(wp), intent(in) :: mobility(3, 3)
+      !> Sums over at least one contact
+      type(spring_sums_t), intent(in) :: sums
       type(modes_t), intent(out) :: modes
-      real(wp) :: root(3, 3), axes(3, 3), square(3), axis(3), outer(3, 3), share
+      real(wp) :: root(3, 3), axes(3, 3), square(3), outer(3, 3), share, force
       integer :: k
 
       call find_root(mobility, root)
-      call diagonalise(matmul(transpose(root), matmul(stiffness, root)), square, axes)
+      call diagonalise(matmul(transpose(root), matmul(sums%stiffness, root)), square, axes)
       do k = 1, 3
          share = square(k)/maxval(square)
          if (share <= epsilon(share)) cycle
-         axis = matmul(root, axes(:, k))
-         outer = spread(axis, 2, 3)*spread(axis, 1, 3)*((1.0_wp + half_weight)*share**2/(share**2 + half_weight))
+         outer = (1.0_wp + half_weight)*share**2/(share**2 + half_weight)*outer_square(matmul(root, axes(:, k)))
          modes%mobility = modes%mobility + outer/sqrt(square(k))
          modes%compliance = modes%compliance + outer/square(k)
-         modes%damping = modes%damping + outer/(square(k)*sqrt(square(k)))
       end do
+      modes%motion = matmul(modes%compliance, sums%impulse)
+      force = dot_product(sums%impulse, matmul(mobility, sums%impulse))
+      if (force > 0.0_wp) modes%period = sqrt(dot_product(sums%impulse, modes%motion)/force)
+      if (sums%squares > 0.0_wp) modes%factor = sqrt(min(1.0_wp, &
+         dot_product(sums%elastic, matmul(modes%compliance, sums%elastic))/sums%squares))
    end subroutine find_modes
+
+   !> Find the damping of one contact: its force and its dashpot, both over 2 zeta sqrt(E).
+   pure subroutine find_damping(spring, modes, force, dashpot)
+      type(spring_t), intent(in) :: spring
+      !> Modes of its two bodies
+      type(modes_t), intent(in) :: modes
+      !> The force [sqrt(N) m/s]
+      real(wp), intent(out) :: force
+      !> The dashpot [sqrt(N)]
+      real(wp), intent(out) :: dashpot
+      real(wp) :: rigid
+
+      associate (row => spring%row, k => modes%factor*spring%stiffness)
+         rigid = dot_product(row, modes%motion)
+         dashpot = k*dot_product(row, matmul(modes%mobility, row))/dot_product(row, matmul(spring%mobility, row))
+         force = k*modes%period*rigid + dashpot*(spring%rate - rigid)
+      end associate
+   end subroutine find_damping
+
+   !> The matrix a a^T
+   pure function outer_square(a) result(matrix)
+      real(wp), intent(in) :: a(3)
+      real(wp) :: matrix(3, 3)
+
+      matrix = spread(a, 2, 3)*spread(a, 1, 3)
+   end function outer_square
 
    !> Find the lower triangular root C of a positive definite matrix C C^T.
    pure subroutine find_root(matrix, root)

@@ -79,8 +79,8 @@ contains
       if (self%friction_column > 0) &
          call include_friction(factor, block, reach, history%column(self%friction_column)%value, mobility)
       do c = 1_ip, block%n
-         force(c) = factor*merge(block%shared_force(c), sqrt(block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c), &
-                                 block%shared_dashpot(c) > 0.0_wp)
+         force(c) = factor*merge(block%shared_force(c), &
+            sqrt(block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c), block%shared_dashpot(c) > 0.0_wp)
       end do
       call self%coefficient%scale(block%n, block%material, force)
       call self%add_limited(force, block)
@@ -92,8 +92,8 @@ contains
       call self%coefficient%scale(block%n, block%material, block%dashpot)
    end subroutine add
 
-   !> Mobility of the point of each contact along its normal: 1/m + r^2/I of both bodies, r being the lever of the normal
-   !> force [m/kg]
+   !> Mobility of the point of each contact along its normal: 1/m + r^2/I of both bodies, r being the lever of the force
+   !> [m/kg]
    pure subroutine find_mobilities(block, reach, mobility)
       type(contact_block_t), intent(in) :: block
       !> Lengths by which the gradients of the areas are divided [m]
@@ -110,8 +110,8 @@ contains
       end do
    end subroutine find_mobilities
 
-   !> Add to the mobilities what friction does to the approach: its force of the last step over the present normal force,
-   !> times the mobility between the directions of both.
+   !> Add to the mobilities what friction does to the approach: its force of the last step over the present normal
+   !> force, times the mobility between the directions of both.
    pure subroutine include_friction(factor, block, reach, friction, mobility)
       !> 2 zeta sqrt(E)
       real(wp), intent(in) :: factor
