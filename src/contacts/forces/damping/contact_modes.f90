@@ -19,8 +19,8 @@
 !>
 !> The frequency is that of the present stiffness, which changes with the depth. For one contact of the conservative
 !> law, damping by the present stiffness gives the restitution exactly. So it does for several, if k is the square of
-!> their force over twice their energy. The springs have more where no rigid displacement d gives all elastic forces f_i at
-!> once, k_i J_i d /= f_i, as for a corner on many pieces; hence the factor
+!> their force over twice their energy. The springs have more where no rigid displacement d gives all elastic forces f_i
+!> at once, k_i J_i d /= f_i, as for a corner on many pieces; hence the factor
 !>
 !>     r^2 = Q^T K^+ Q/sum_i(f_i^2/k_i) <= 1,     Q = sum_i f_i J_i^T.
 module polydem_contact_modes
