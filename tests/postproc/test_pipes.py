@@ -39,7 +39,7 @@ def test_a_pipe_in_the_command_line_is_told_in_a_sentence(words, tmp_path):
     for name in ("pipe", "pipe.csv"):
         os.mkfifo(tmp_path / name)
     (tmp_path / "base.nml").write_text("&scene name = 'gas' /\n")
-    done = subprocess.run([sys.executable, "-m", "polydem_post", words[0], *program, *words[1:]], cwd=tmp_path, capture_output=True, text=True,
-                          check=False, stdin=subprocess.DEVNULL, timeout=600)
+    done = subprocess.run([sys.executable, "-m", "polydem_post", words[0], *program, *words[1:]], cwd=tmp_path,
+                          capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=600)
     assert done.returncode == 2 and ": cannot be read (it is a pipe or a device" in done.stderr, done.stderr
     assert "Traceback" not in done.stderr
