@@ -204,7 +204,7 @@ def walls_that_have_vanished_stay_away(case):
                               **({"ranks": ranks} if ranks else {}))
             assert re.search(r"^bodies +83 ", output, re.MULTILINE), output
             assert last_poses("away") == expected
-    output = case.run(start.format("gone:-1") + rest.format(half, scheme), "from_frame")
+    output = case.run(start.format("gone:-1") + rest.format(half, scheme), "away_from_frame")
     assert re.search(r"^bodies +83 ", output, re.MULTILINE), output
     case.run(text.format(1.0) + rest.format(half, scheme), "closed")
     output = case.run(start.format("closed") + rest.format(half, scheme), "open")
