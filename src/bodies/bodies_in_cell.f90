@@ -14,7 +14,8 @@ module polydem_bodies_in_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: set_cell, change_cell, find_folds, stretch_bodies, wrap_bodies, put_into_cell, add_profile, path_of
+   public :: set_cell, change_cell, find_folds, stretch_bodies, wrap_bodies, follow_shear, put_into_cell, &
+             add_profile, path_of
 
 contains
 
@@ -102,6 +103,27 @@ contains
          end do
       end associate
    end subroutine stretch_bodies
+
+   !> Let some free bodies keep their velocity relative to a shear that changes in this step. Several threads may call it
+   !> for different bodies.
+   pure subroutine follow_shear(bodies, slots)
+      !> Bodies in the cell at the start of a step; `position` and `velocity` change along x
+      type(bodies_t), intent(inout) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in), contiguous :: slots(:)
+      real(wp) :: height
+      integer(ip) :: k
+
+      associate (cell => bodies%cell)
+         do k = 1_ip, size(slots, kind=ip)
+            associate (s => slots(k))
+               height = bodies%position(2, s) - (cell%low(2) + 0.5_wp*cell%size(2))
+               bodies%position(1, s) = bodies%position(1, s) + cell%lag*height
+               bodies%velocity(1, s) = bodies%velocity(1, s) + cell%kick*height
+            end associate
+         end do
+      end associate
+   end subroutine follow_shear
 
    !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
    pure subroutine wrap_bodies(bodies, slots)

@@ -5,7 +5,8 @@
 !>
 !> In a *sheared* cell the copies above and below move along x, the upper one by `shift` with the velocity `jump`
 !> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields. A
-!> cell at rest whose copies are displaced, at the start from a sheared result, is one with the rate 0.
+!> cell at rest whose copies are displaced, at the start from a sheared result, is one with the rate 0. While rate or
+!> height change, every body keeps its velocity relative to the shear (`kick`), else a body and its copy would not.
 !>
 !> A cell that *yields* has a size that obeys a stress (`polydem_cell_load`).
 module polydem_cell
@@ -62,6 +63,9 @@ module polydem_cell
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Both at the start of the step; before the first one those of the state from which bodies enter the cell
       real(wp) :: former_shift = 0.0_wp, former_jump = 0.0_wp
+      !> What a change of the shear within the step gives to bodies, over their height above the middle of the cell: a
+      !> velocity [1/s], and the displacement that is left of that of the shear beyond the step times the new velocity
+      real(wp) :: kick = 0.0_wp, lag = 0.0_wp
       !> The stress that its size obeys; not allocated if the size is constant
       type(cell_load_t), allocatable :: load
    end type cell_t
@@ -117,7 +121,31 @@ contains
          call find_shear(cell, to, cell%shift, cell%jump)
          cell%shift = modulo(cell%former_shift + 0.5_wp*(to - from)*(cell%former_jump + cell%jump), cell%size(1))
       end if
+      call find_kick(to - from, cell)
    end subroutine shear_cell
+
+   !> Find what a change of the shear gives to bodies. Both are exactly 0 if the copies keep their velocity.
+   pure subroutine find_kick(dt, cell)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Cell with shift and jump of the start and the end of the step
+      type(cell_t), intent(inout) :: cell
+      real(wp) :: slide
+
+      cell%kick = (cell%jump - cell%former_jump)/cell%size(2)
+      cell%lag = 0.0_wp
+      if (.not. abs(cell%kick) > 0.0_wp) return
+      slide = 0.5_wp*dt*(cell%former_jump + cell%jump)
+      slide = slide + remainder_of(cell%shift - cell%former_shift - slide, cell%size(1))
+      cell%lag = (slide - dt*cell%jump)/cell%size(2)
+   end subroutine find_kick
+
+   !> What is left of a length when the nearest multiple of a period is taken off [m]
+   elemental real(wp) function remainder_of(length, period) result(rest)
+      real(wp), intent(in) :: length, period
+
+      rest = length - period*anint(length/period)
+   end function remainder_of
 
    !> Change the size of a cell that yields by its motion in a step, by velocity Verlet.
    pure subroutine grow_cell(dt, cell)

@@ -5,7 +5,7 @@ module polydem_predict
    use polydem_bodies, only: block_size, bodies_t
    use polydem_body_motion, only: body_motion_t
    use polydem_body_runs, only: find_run, list_others, number_of_parts
-   use polydem_bodies_in_cell, only: stretch_bodies, wrap_bodies
+   use polydem_bodies_in_cell, only: follow_shear, stretch_bodies, wrap_bodies
    use polydem_boxes_within, only: have_boxes_within
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t
@@ -152,8 +152,8 @@ contains
    end subroutine predict_block
 
    !> Return those of up to `block_size` bodies to the cell that have left it, and stretch their places with a cell that
-   !> yields. What this changes of their momentum and kinetic energy is the work of the cell, and counts as that of a
-   !> wall.
+   !> yields, and let them follow a shear that changes. What this changes of their momentum and kinetic energy is the work
+   !> of the cell, and counts as that of a wall.
    subroutine return_to_cell(dt, slots, bodies, balance)
       !> Time step [s]
       real(wp), intent(in) :: dt
@@ -170,6 +170,7 @@ contains
       if (changes) former(:, :size(slots)) = bodies%velocity(:, slots)
       if (allocated(bodies%cell%load)) call stretch_bodies(bodies, slots)
       call wrap_bodies(bodies, slots)
+      if (abs(bodies%cell%kick) > 0.0_wp) call follow_shear(bodies, slots)
       if (.not. (changes .and. allocated(balance%wall_sum))) return
       do k = 1_ip, size(slots, kind=ip)
          associate (m => bodies%mass(slots(k)), v => bodies%velocity(:, slots(k)), &

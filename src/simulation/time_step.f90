@@ -46,6 +46,7 @@ contains
       self%step = self%step + 1_lp
       call expire_balance(self%energy_balance)
       call change_cell(self%dt, real(self%step - 1_lp, wp)*self%dt, time_of(self), self%bodies)
+      if (abs(self%bodies%cell%kick) > 0.0_wp) call self%motion%flight%forget_velocities()
       call check_cell(self, error)
       associate (timers => self%timers, domain => self%domain)
          call timers%start()

@@ -27,8 +27,6 @@ def border(scene, dice):
         by[1], drift, low[1] = 0.0, np.zeros(2), scene.get("cell", "low")[1]
         other.put("cell", low=list(low))
     if rate and "shear_ramp" in scene.tags:
-        if profile or {"drag", "local_damping"} & scene.tags:
-            return None
         drift = np.zeros(2)
     inside = dice.random() < 0.5
     for body in other.bodies:
@@ -43,8 +41,13 @@ def border(scene, dice):
             ends[0][axis] += cells
             ends[1][axis] += cells
         other.put(f"source.{name}", low=list(ends[0]), high=list(ends[1]))
-    return Case([Play(other)], drift=drift, relative="stress_controlled" in scene.tags,
+    return Case([Play(other)], drift=drift, relative=is_relative(scene),
                 energies="sheared" not in scene.tags)
+
+
+def is_relative(scene):
+    """Whether the middle of the cell is no frame at constant velocity: its height or its shear changes."""
+    return bool({"stress_controlled", "shear_ramp"} & scene.tags)
 
 
 def fold(body, low, size, axes, jump):
@@ -83,7 +86,7 @@ def copies(scene, numbers):
     offsets = [np.array([i, j]) for j in range(numbers[1]) for i in range(numbers[0])]
     ids = copy_bodies(scene, other, offsets, jump, drift)
     copy_groups(scene, other, [offset*size for offset in offsets], ids)
-    return Case([Play(other)], ids=ids, drift=drift, copies=len(offsets), relative="stress_controlled" in scene.tags,
+    return Case([Play(other)], ids=ids, drift=drift, copies=len(offsets), relative=is_relative(scene),
                 energies=not sheared)
 
 
@@ -93,10 +96,7 @@ def has_copies(scene, sheared):
         return False
     if not sheared:
         return True
-    if RECTANGLES & scene.tags or (scene.prelude and "shear_ramp" in scene.tags):
-        return False
-    moves = scene.get("cell", "profile", False) or {"drag", "local_damping"} & scene.tags
-    return not ("shear_ramp" in scene.tags and moves)
+    return not RECTANGLES & scene.tags and not (scene.prelude and "shear_ramp" in scene.tags)
 
 
 def copy_bodies(scene, other, offsets, jump, drift):

@@ -6,7 +6,7 @@ reason stand in the table of README.md, and nowhere else.
 
 import numpy as np
 from case import Case
-from cells import border, copies_2x2, copies_3x1
+from cells import border, copies_2x2, copies_3x1, is_relative
 from runs import Play
 from splits import split_checkpoint, split_continue, split_frame, stage_boundary
 
@@ -45,7 +45,7 @@ def moving_frame(scene, dice):
     if any(body.fixed for body in other.bodies):
         # It comes last: the motions before it keep their pivots.
         other.put("motion.frame", kind="translation", velocity=list(drift))
-    return Case([Play(other)], drift=drift, relative="stress_controlled" in scene.tags, energies=False)
+    return Case([Play(other)], drift=drift, relative=is_relative(scene), energies=False)
 
 
 # Order, and what is far away

@@ -82,6 +82,7 @@ contains
    end subroutine enter_cell
 
    !> Put bodies into the cell at the start, and give them the profile of its shear, less that which they have already.
+   !> A shear that grows is 0 at the start.
    pure subroutine join_copies(settings, slots, bodies)
       type(cell_settings_t), intent(in) :: settings
       !> Slots of the bodies
@@ -89,11 +90,14 @@ contains
       !> Bodies after `find_folds`, in a cell before its first step: its former jump is that of the shear of the bodies
       type(bodies_t), intent(inout) :: bodies
 
+      real(wp) :: rate
+
       call put_into_cell(bodies, slots)
       if (.not. settings%profile) return
       associate (cell => bodies%cell)
-         if (abs(cell%rate*cell%size(2) - cell%former_jump) > 0.0_wp) &
-            call add_profile(bodies, cell%rate - cell%former_jump/cell%size(2), slots)
+         rate = merge(0.0_wp, cell%rate, cell%ramp > 0.0_wp)
+         if (abs(rate*cell%size(2) - cell%former_jump) > 0.0_wp) &
+            call add_profile(bodies, rate - cell%former_jump/cell%size(2), slots)
       end associate
    end subroutine join_copies
 
