@@ -1,7 +1,8 @@
 """Seeded scenes over all capabilities: a few bodies that touch early, and some hundred steps.
 
-Each draw takes a container, a model of contacts and two to six further capabilities. `tags` names all that a scene
-uses; what acts on single bodies only stands in `acts`.
+`design.py` chooses a container, a model of contacts and further capabilities. `tags` names all that a scene uses; what
+acts on single bodies only stands in `acts`. One grain, the first, is where all of them are likely to meet: in the
+corner of the walls or at the border of the cell, beside the gate, in the sink, below the source.
 """
 
 import math
@@ -9,20 +10,8 @@ import random
 
 import numpy as np
 from additions import Additions
-from capabilities import (
-    ALTERNATIVES,
-    CONTAINERS,
-    DAMPINGS,
-    DRIVEN,
-    EXTRAS,
-    FRICTIONS,
-    IMPACTS,
-    LAWS,
-    LONG,
-    SCHEMES,
-    STARTS,
-    WITHOUT_WALLS,
-)
+from capabilities import CONTAINERS, DRIVEN, EXTRAS, IMPACTS, KINDS, LONG, STARTS, WITHOUT_WALLS
+from design import chosen_of
 from impacts import draw_impact
 from shapes import angle_iron, box, corners, cross, cut_square, random_convex, regular, turned
 
@@ -34,22 +23,25 @@ def draw(seed, impossible):
     dice = random.Random(seed)
     if seed % IMPACTS == IMPACTS - 1:
         return draw_impact(dice)
-    return Drawing(dice, impossible).scene
+    return Drawing(dice, chosen_of(seed, impossible)).scene
 
 
 class Drawing(Additions):
     """A scene that is being drawn."""
 
-    def __init__(self, dice, impossible):
+    def __init__(self, dice, chosen):
         self.dice = dice
-        self.impossible = impossible
-        self.choose()
+        self.container = next(name for name in CONTAINERS if name in chosen)
+        self.chosen = {name for name in chosen if name in EXTRAS}
+        self.model = [name for name in chosen if name not in (*CONTAINERS, *EXTRAS)]
         self.radius = dice.uniform(4e-3, 7e-3)
         self.stiffness = dice.uniform(1e5, 5e5)
         self.density = dice.uniform(1000, 3000)
         mass = self.density*2*self.radius**2
-        dt = 0.02*math.sqrt(mass/self.stiffness)
-        self.scene = Scene(dt, steps=dice.randint(12, 20)*20, every=20)
+        #: Whether a load passes its cell more than once: a longer run
+        self.passes = "load" in chosen and self.container.startswith("periodic") and dice.random() < 0.5
+        dt = (0.03 if self.passes else 0.02)*math.sqrt(mass/self.stiffness)
+        self.scene = Scene(dt, steps=dice.randint(12, 20)*20*(2 if self.passes else 1), every=20)
         self.scene.tags = {self.container, *self.chosen}
         self.next_id = 1
         self.floors = []
@@ -62,34 +54,6 @@ class Drawing(Additions):
 
     def uniform(self, low, high):
         return self.dice.uniform(low, high)
-
-    def goes(self, name, others):
-        """Whether a capability goes with others."""
-        return not any(frozenset((name, other)) in self.impossible for other in others) and all(
-            name not in group or len(group & set(others)) < most for group, most in ALTERNATIVES)
-
-    def choose(self):
-        """A pair of capabilities, all pairs alike; what goes with both; a container and a model that do."""
-        dice, every = self.dice, [*CONTAINERS, *EXTRAS]
-        while True:
-            chosen = dice.sample(every, 2)
-            if (chosen[0] in CONTAINERS and chosen[1] in CONTAINERS) or not self.goes(chosen[1], chosen[:1]):
-                continue
-            containers = [name for name in CONTAINERS if name in chosen] or [
-                name for name in CONTAINERS if all(self.goes(other, [name]) for other in chosen)]
-            if containers:
-                break
-        self.container = dice.choice(containers)
-        extras = [name for name in chosen if name not in CONTAINERS]
-        for name in dice.sample(EXTRAS, dice.randint(1, 4)):
-            if name not in extras and self.goes(name, [*extras, self.container]):
-                extras.append(name)
-        self.chosen = set(extras)
-        self.model = []
-        for kind, names in (("scheme", SCHEMES), ("friction", FRICTIONS), ("damping", DAMPINGS), ("law", LAWS)):
-            possible = [name for name in names
-                        if self.goes(f"{kind}_{name}", [self.container, *extras, *self.model])]
-            self.model.append(f"{kind}_{dice.choice(possible)}")
 
     def new(self, pieces, fixed=False, **how):
         body = Body(self.next_id, [np.asarray(piece, dtype=float) for piece in pieces], fixed, **how)
@@ -108,36 +72,49 @@ class Drawing(Additions):
             self.scene.acts.setdefault(identifier, set()).add(name)
 
     def draw_container(self):
-        """All grains start in a box from `low` to `low` + `size`, and fall `down`."""
-        cells = [self.dice.randint(2, 4), self.dice.randint(1, 3)]
-        if "source" in self.chosen:
-            # One place is left free.
-            cells[0] = max(cells[0], 3)
+        """All grains start in a grid from `low` to `low` + `size`, and fall `down`."""
+        dice, axis = self.dice, "xy".find(self.container[-1]) if self.container[:-1] == "periodic_" else -1
+        cells = [dice.randint(2, 3), dice.randint(1, 2)]
+        if self.container in WITHOUT_WALLS:
+            # One place is left free for a source.
+            cells = [3 if "source" in self.chosen else dice.randint(2, 3), dice.randint(2, 3)]
+        elif len(DRIVEN & self.chosen) > 1 or "source" in self.chosen:
+            # The first grain is below the source, and between two walls.
+            cells[1] = 1
+        if axis == 1:
+            cells = cells[::-1]
         self.pitch, self.grid = 2.0*self.radius*self.uniform(0.93, 1.05), cells
         self.low = np.array([self.uniform(-0.05, 0.05), self.uniform(-0.05, 0.05)])
         self.size = np.array(cells)*self.pitch
-        self.down = np.array([0.0, -1.0])
+        self.border = self.low.copy()
+        self.down = np.array([-1.0, 0.0]) if axis == 1 else np.array([0.0, -1.0])
         if self.container == "plane":
             self.new_floor("floor", 0)
             self.new_floor("left", 1)
-        elif self.container in ("periodic_x", "periodic_y"):
-            self.draw_channel("xy".index(self.container[-1]))
-        else:
-            self.size = np.maximum(self.size, 4.8*self.radius)
-            if self.container == "periodic_xy" and DRIVEN & self.chosen:
-                self.size[1] += 1.2*self.radius
-                self.new_row("floor", 0)
-            self.scene.put("cell", periodic="xy", low=list(self.low), size=list(self.size))
-            getattr(self, f"draw_{self.container}", lambda: None)()
+            return
+        for k in (0, 1) if axis < 0 else (axis,):
+            self.size[k] = max(self.size[k], 4.8*self.radius)
+        if self.container == "periodic_xy" and DRIVEN & self.chosen:
+            self.size[1] += 1.2*self.radius
+            self.new_row("floor", 0)
+        self.draw_cell(axis)
+        if axis >= 0:
+            self.draw_channel(axis)
+        elif self.container != "periodic_xy":
+            getattr(self, f"draw_{self.container}")()
+
+    def draw_cell(self, axis):
+        """Its border often lies between the first two grains of an axis."""
+        for k in (0, 1) if axis < 0 else (axis,):
+            if self.dice.random() < 0.7:
+                self.border[k] -= self.size[k] - self.pitch
+        periodic = "xy" if axis < 0 else "xy"[axis]
+        self.scene.put("cell", periodic=periodic, low=list(self.border), size=list(self.size))
 
     def draw_channel(self, axis):
         """A cell that repeats along one axis, between one or two walls."""
-        self.size[axis] = max(self.size[axis], 4.8*self.radius)
-        if axis == 1:
-            self.down = np.array([-1.0, 0.0])
-        self.scene.put("cell", periodic="xy"[axis], low=list(self.low), size=list(self.size))
         rows = {"load", "motion_constant", "motion_table", "motion_oscillation"} & self.chosen
-        if rows and self.dice.random() < 0.7:
+        if self.passes or (rows and self.dice.random() < 0.7):
             self.new_row("floor", axis)
         else:
             self.new_floor("floor", axis)
@@ -171,11 +148,11 @@ class Drawing(Additions):
         """A long wall along an axis below (or above) the grains."""
         across = 1 - axis
         low, high = np.empty(2), np.empty(2)
-        low[axis], high[axis] = self.low[axis] - 3*self.radius, self.low[axis] + LONG
+        low[axis], high[axis] = self.border[axis] - 3*self.radius, self.border[axis] + LONG
         thick = self.uniform(1.5, 4)*self.radius
         face = self.low[across]
         if above:
-            face += self.size[across] + 2.6*self.radius*("source" in self.chosen)
+            face += self.size[across] + 2.0*self.radius*("source" in self.chosen)
         low[across], high[across] = (face, face + thick) if above else (face - thick, face)
         body = self.new([box(low, high)], fixed=True)
         tags = ("long_wall",) if self.scene.groups.get("cell") else ()
@@ -183,7 +160,7 @@ class Drawing(Additions):
         self.floors.append(name)
 
     def new_row(self, name, axis):
-        """Glued grains along a periodic axis."""
+        """Glued grains along a periodic axis, or a flat belt of boxes if it passes the cell."""
         across = 1 - axis
         n = max(4, round(self.size[axis]/(0.8*self.radius)))
         bodies = []
@@ -191,7 +168,11 @@ class Drawing(Additions):
             place = np.empty(2)
             place[axis] = self.low[axis] + (k + 0.5)*self.size[axis]/n
             place[across] = self.low[across]
-            bodies.append(self.new([regular(place, 0.62*self.size[axis]/n, 6, self.uniform(0, 1))], fixed=True))
+            half = np.full(2, 0.51*self.size[axis]/n)
+            half[across] = 0.4*self.radius
+            outline = box(place - half, place + half) if self.passes else regular(
+                place, 0.62*self.size[axis]/n, 6, self.uniform(0, 1))
+            bodies.append(self.new([outline], fixed=True))
         self.name_wall(name, bodies, "rows")
         self.floors.append(name)
 
@@ -206,6 +187,10 @@ class Drawing(Additions):
                 pieces = self.shape(place, tilt)
                 body = self.new(pieces, velocity=np.array([self.uniform(-1.5, 1.5), self.uniform(-1.5, 1.5)]),
                                 spin=self.uniform(-60, 60))
+                if (i, j) == (0, 0):
+                    # It moves to the walls, or to its neighbour across the border.
+                    body.velocity = abs(body.velocity)*np.where(self.border < self.low, 1, -1)
+                    self.first = body
                 if len(pieces) > 1:
                     self.scene.acts.setdefault(body.id, set()).add("pieces")
                 # No part below the floors
@@ -220,14 +205,15 @@ class Drawing(Additions):
 
     def shape(self, place, tilt):
         dice, radius = self.dice, self.radius
-        if "pieces" in self.chosen and dice.random() < 0.7:
+        if "pieces" in self.chosen and (not self.scene.free or dice.random() < 0.5):
             angle = tilt + self.uniform(0, 3)
             return [turned(piece, angle, place) for piece in dice.choice((cross, angle_iron, cut_square))(radius)]
         return [random_convex(dice, place, radius*self.uniform(0.85, 1.0))]
 
     def draw_forces(self):
         dice, scene = self.dice, self.scene
-        scheme, friction, damping, law = (name.split("_", 1)[1] for name in self.model)
+        scheme, friction, damping, law = (next(name for name in self.model if name in kind).split("_", 1)[1]
+                                          for kind in KINDS)
         entries = {"law": law, "stiffness": self.stiffness, "friction": friction}
         if damping == "restitution":
             entries.update(damping="rate", restitution=self.uniform(0.1, 0.9))
