@@ -88,7 +88,9 @@ class Additions:
         if along is None:
             return
         end = self.scene.dt*self.scene.steps
-        turn = self.uniform(-5, 5) if self.container == "plane" else 0.0
+        # The velocity of a belt stays along its face.
+        turns = self.container == "plane" and "motion_conveyor" not in self.chosen
+        turn = self.uniform(-5, 5) if turns else 0.0
         rows = [[0, 0, 0, 0], [0.4*end, *(0.3*self.radius*along), turn], [0.8*end, *(-0.2*self.radius*along), 0],
                 [1.5*end, 0, 0, 0.3*turn]]
         self.scene.put("motion.motion_table", pivot=list(self.low))
@@ -103,7 +105,7 @@ class Additions:
         if self.passes:
             along = np.eye(2)[self.scene.periodic[0]]
         axis = int(along[1] > 0.5)
-        mass, far = self.uniform(0.05, 0.5), axis in self.scene.periodic
+        mass, far = self.uniform(0.2, 1), axis in self.scene.periodic
         # The speed F/c, to which it tends
         ratio, speed = self.uniform(0.02, 0.2), self.uniform(0.3, 2)
         damping = 2*ratio*math.sqrt(self.stiffness*mass)
@@ -134,14 +136,15 @@ class Additions:
 
     def add_gate(self):
         """A small wall that some grain touches, until it vanishes."""
-        body, quarter = self.first, math.pi/2
-        # Between the first grain and its neighbours, off the walls
-        turns = {"plane": (0,), "periodic_x": (0, 1), "periodic_y": (0, 3)}.get(self.container, (0, 1, 2, 3))
-        angle = (self.dice.choice(turns) + 0.5)*quarter + self.uniform(-0.2, 0.2)
-        place = body.centre + (0.8*body.reach + 0.15*self.radius)*unit(angle)
+        # Ahead of the first grain, between its neighbours and off the walls
+        ahead = [1 if axis not in self.scene.periodic or self.border[axis] < self.low[axis] else -1 for axis in (0, 1)]
+        angle = math.atan2(ahead[1], ahead[0]) + self.uniform(-0.2, 0.2)
+        place = self.first.centre + (0.75*self.first.reach + 0.15*self.radius)*unit(angle)
         gate = self.new([regular(place, 0.3*self.radius, 5, self.uniform(0, 1))], fixed=True)
         self.name_wall("gate", [gate], "gate")
-        self.scene.put("wall.gate", vanish_at=(self.dice.randint(5, 20)*10 + 0.5)*self.scene.dt)
+        # A checkpoint of a run in which it has vanished starts no other.
+        first = 13 if "start_checkpoint" in self.chosen else 5
+        self.scene.put("wall.gate", vanish_at=(self.dice.randint(first, 20)*10 + 0.5)*self.scene.dt)
 
     def add_stages(self):
         scene, first = self.scene, self.dice.randint(4, 8)*20
@@ -152,6 +155,7 @@ class Additions:
         if self.container != "stress_controlled" and self.dice.random() < 0.5:
             gravity = np.array(scene.get("forces", "gravity"))
             scene.put("stage.second", gravity=list(0.5*gravity + 20*unit(self.uniform(0, 6.28))))
+            scene.tags.add("stage_gravity")
         if self.dice.random() < 0.3:
             scene.put("stage.second", drag=self.uniform(5, 30))
             scene.tags.add("drag")
@@ -208,9 +212,10 @@ class Additions:
             first, last = self.border[axis] + 1.001*wide, self.border[axis] + self.size[axis] - 1.001*wide
             place[axis] -= math.floor((place[axis] - self.border[axis])/self.size[axis])*self.size[axis]
             place[axis] = min(max(place[axis], first), last)
+        # A run from a result has no density of its scene.
         outline = [-half, -half, half, -half, half, half, -half, half]
         scene.put("source.feed", low=list(place - wide), high=list(place + wide), shape="outline",
-                  outline=outline, angle=[0.0, 0.0], velocity=list(velocity), interval=interval)
+                  outline=outline, angle=[0.0, 0.0], velocity=list(velocity), interval=interval, density=self.density)
         if self.container == "sheared":
             # One enters at once: later, its place would differ where the same shear is seen from another height.
             scene.put("source.feed", count=len(scene.free) + 1)
@@ -220,13 +225,15 @@ class Additions:
     def add_sink(self):
         scene = self.scene
         body = self.first if self.dice.random() < 0.8 else self.dice.choice(scene.free)
-        wide = self.uniform(0.6, 1.2)*self.radius
-        ahead = self.uniform(0, 0.6)*scene.steps*scene.dt*body.velocity
-        low = body.centre + ahead + self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
+        wide, interval = self.uniform(1.0, 1.5)*self.radius, self.dice.choice((120, 160, 200))
+        ahead = self.uniform(0.3, 1)*interval*scene.dt*body.velocity
+        low = body.centre + ahead + 0.3*self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
         if scene.periodic and self.dice.random() < 0.6:
+            # Across the border that is nearer
             axis = self.dice.choice(scene.periodic)
-            low[axis] = self.border[axis] + self.dice.choice((0, 1))*self.size[axis] - wide*self.uniform(0.5, 1.5)
-        scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=self.dice.choice((20, 60, 100, 140)))
+            sides = [self.border[axis], self.border[axis] + self.size[axis]]
+            low[axis] = min(sides, key=lambda side: abs(side - body.centre[axis])) - wide*self.uniform(0.8, 1.2)
+        scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=interval)
 
     def add_cohesion(self):
         self.scene.put("forces", cohesion=self.uniform(0.002, 0.02)*self.stiffness)

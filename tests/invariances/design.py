@@ -6,12 +6,13 @@ are rare so far. A capability that seldom acts on a touching body counts less, s
 
 import functools
 import itertools
+import math
 import random
 
 from capabilities import ALTERNATIVES, CAPABILITIES, CONTAINERS, EXTRAS, IMPACTS, KINDS, SELDOM, alternatives
 
 #: Seeds of a block
-BLOCK = 96
+BLOCK = 60
 #: Fewest and most capabilities of a scene beside container and model of contacts
 FEWEST, MOST = 2, 7
 
@@ -66,5 +67,6 @@ class Design:
                 break
             chosen.append(name)
         for pair in map(frozenset, itertools.combinations(chosen, 2)):
-            self.count[pair] += SELDOM.get(min(pair, key=lambda name: SELDOM.get(name, 1)), 1)
+            if pair in self.count:
+                self.count[pair] += math.prod(SELDOM.get(name, 1) for name in pair)
         return tuple(chosen)

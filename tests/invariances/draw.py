@@ -40,7 +40,7 @@ class Drawing(Additions):
         mass = self.density*2*self.radius**2
         #: Whether a load passes its cell more than once: a longer run
         self.passes = "load" in chosen and self.container.startswith("periodic") and dice.random() < 0.5
-        dt = (0.03 if self.passes else 0.02)*math.sqrt(mass/self.stiffness)
+        dt = (0.025 if self.passes else 0.018)*math.sqrt(mass/self.stiffness)
         self.scene = Scene(dt, steps=dice.randint(12, 20)*20*(2 if self.passes else 1), every=20)
         self.scene.tags = {self.container, *self.chosen}
         self.next_id = 1
@@ -93,7 +93,8 @@ class Drawing(Additions):
             self.new_floor("left", 1)
             return
         for k in (0, 1) if axis < 0 else (axis,):
-            self.size[k] = max(self.size[k], 4.8*self.radius)
+            # A cell that obeys a stress shrinks.
+            self.size[k] = max(self.size[k], (5.6 if self.container == "stress_controlled" else 4.8)*self.radius)
         if self.container == "periodic_xy" and DRIVEN & self.chosen:
             self.size[1] += 1.2*self.radius
             self.new_row("floor", 0)
@@ -106,15 +107,16 @@ class Drawing(Additions):
     def draw_cell(self, axis):
         """Its border often lies between the first two grains of an axis."""
         for k in (0, 1) if axis < 0 else (axis,):
-            if self.dice.random() < 0.7:
+            if self.dice.random() < 0.9:
                 self.border[k] -= self.size[k] - self.pitch
         periodic = "xy" if axis < 0 else "xy"[axis]
         self.scene.put("cell", periodic=periodic, low=list(self.border), size=list(self.size))
 
     def draw_channel(self, axis):
         """A cell that repeats along one axis, between one or two walls."""
+        # The faces of a row have seams, across which a belt would run.
         rows = {"load", "motion_constant", "motion_table", "motion_oscillation"} & self.chosen
-        if self.passes or (rows and self.dice.random() < 0.7):
+        if self.passes or (rows and "motion_conveyor" not in self.chosen and self.dice.random() < 0.7):
             self.new_row("floor", axis)
         else:
             self.new_floor("floor", axis)
@@ -160,7 +162,7 @@ class Drawing(Additions):
         self.floors.append(name)
 
     def new_row(self, name, axis):
-        """Glued grains along a periodic axis, or a flat belt of boxes if it passes the cell."""
+        """Glued grains along a periodic axis, or a flat belt of boxes if it runs or passes the cell."""
         across = 1 - axis
         n = max(4, round(self.size[axis]/(0.8*self.radius)))
         bodies = []
@@ -170,7 +172,8 @@ class Drawing(Additions):
             place[across] = self.low[across]
             half = np.full(2, 0.51*self.size[axis]/n)
             half[across] = 0.4*self.radius
-            outline = box(place - half, place + half) if self.passes else regular(
+            flat = self.passes or "motion_conveyor" in self.chosen
+            outline = box(place - half, place + half) if flat else regular(
                 place, 0.62*self.size[axis]/n, 6, self.uniform(0, 1))
             bodies.append(self.new([outline], fixed=True))
         self.name_wall(name, bodies, "rows")
@@ -189,19 +192,22 @@ class Drawing(Additions):
                                 spin=self.uniform(-60, 60))
                 if (i, j) == (0, 0):
                     # It moves to the walls, or to its neighbour across the border.
-                    body.velocity = abs(body.velocity)*np.where(self.border < self.low, 1, -1)
+                    body.velocity = (abs(body.velocity) + 0.5)*np.where(self.border < self.low, 1, -1)
                     self.first = body
                 if len(pieces) > 1:
                     self.scene.acts.setdefault(body.id, set()).add("pieces")
-                # No part below the floors
-                if self.container == "plane":
-                    body.move(np.maximum(0, self.low - corners(body).min(axis=0) - 0.02*self.radius))
-                elif self.floors:
-                    across = 0 if self.container == "periodic_y" else 1
-                    by = np.zeros(2)
-                    floor = self.low[across] + ("rows" in self.scene.tags)*0.4*self.radius
-                    by[across] = max(0, floor - corners(body).min(axis=0)[across] - 0.02*self.radius)
-                    body.move(by)
+                # No part below the floors; the first grain touches them.
+                body.move(self.off_walls(body))
+
+    def off_walls(self, body):
+        """By how much a grain is moved, so that no part is below a floor, and the first one touches all floors."""
+        walled = {"plane": (0, 1), "periodic_x": (1,), "periodic_y": (0,)}.get(
+            self.container, (1,) if self.floors else ())
+        by = np.zeros(2)
+        for axis in walled:
+            floor = self.low[axis] + ("rows" in self.scene.tags)*0.4*self.radius
+            by[axis] = floor - 0.02*self.radius - corners(body)[:, axis].min()
+        return by if body is self.first else np.maximum(by, 0)
 
     def shape(self, place, tilt):
         dice, radius = self.dice, self.radius
