@@ -201,13 +201,13 @@ class Additions:
 
     def add_source(self):
         """A square enters beside the first grain, where there is room for one at a place that leaves nothing to chance."""
-        scene, half = self.scene, 0.5*self.radius
+        scene, half = self.scene, 0.4*self.radius
         place, velocity = self.low + np.array([1.5, 0.5])*self.pitch, np.array([-2.0, self.uniform(-0.5, 0.5)])
         if self.container not in WITHOUT_WALLS:
             place = self.low + 0.5*self.pitch - self.down*(0.5*self.pitch + self.radius)
             velocity = 3*self.down
         # The program wants room for its circle in the rectangle.
-        wide, interval = math.sqrt(2)*half*(1 + 1e-12), self.dice.choice((20, 40))
+        wide, interval = math.sqrt(2)*half*(1 + 1e-12), 20
         for axis in scene.periodic:
             first, last = self.border[axis] + 1.001*wide, self.border[axis] + self.size[axis] - 1.001*wide
             place[axis] -= math.floor((place[axis] - self.border[axis])/self.size[axis])*self.size[axis]
@@ -220,19 +220,21 @@ class Additions:
             # One enters at once: later, its place would differ where the same shear is seen from another height.
             scene.put("source.feed", count=len(scene.free) + 1)
         else:
-            scene.put("source.feed", rate=self.uniform(0.4, 0.95)/(interval*scene.dt))
+            scene.put("source.feed", rate=self.uniform(1.01, 1.2)/(interval*scene.dt))
 
     def add_sink(self):
         scene = self.scene
         body = self.first if self.dice.random() < 0.8 else self.dice.choice(scene.free)
-        wide, interval = self.uniform(1.0, 1.5)*self.radius, self.dice.choice((120, 160, 200))
-        ahead = self.uniform(0.3, 1)*interval*scene.dt*body.velocity
+        wide, interval = self.uniform(1.0, 1.5)*self.radius, self.dice.choice((20, 40))
+        ahead = self.uniform(0, 100)*scene.dt*body.velocity
         low = body.centre + ahead + 0.3*self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
         if scene.periodic and self.dice.random() < 0.6:
             # Across the border that is nearer
             axis = self.dice.choice(scene.periodic)
             sides = [self.border[axis], self.border[axis] + self.size[axis]]
             low[axis] = min(sides, key=lambda side: abs(side - body.centre[axis])) - wide*self.uniform(0.8, 1.2)
+        # Else what is there leaves before the first step.
+        self.late = self.dice.random() < 0.7
         scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=interval)
 
     def add_cohesion(self):

@@ -44,6 +44,8 @@ class Drawing(Additions):
         self.scene = Scene(dt, steps=dice.randint(12, 20)*20*(2 if self.passes else 1), every=20)
         self.scene.tags = {self.container, *self.chosen}
         self.next_id = 1
+        #: Whether bodies leave in the second stage only
+        self.late = False
         self.floors = []
         self.draw_container()
         self.draw_grains()
@@ -99,6 +101,9 @@ class Drawing(Additions):
             self.size[1] += 1.2*self.radius
             self.new_row("floor", 0)
         self.draw_cell(axis)
+        if axis < 0 and self.floors:
+            # Above the row, there is room for what enters.
+            self.low[1] += 0.5*self.radius
         if axis >= 0:
             self.draw_channel(axis)
         elif self.container != "periodic_xy":
@@ -107,7 +112,7 @@ class Drawing(Additions):
     def draw_cell(self, axis):
         """Its border often lies between the first two grains of an axis."""
         for k in (0, 1) if axis < 0 else (axis,):
-            if self.dice.random() < 0.9:
+            if self.grid[k] == 2 or self.dice.random() < 0.7:
                 self.border[k] -= self.size[k] - self.pitch
         periodic = "xy" if axis < 0 else "xy"[axis]
         self.scene.put("cell", periodic=periodic, low=list(self.border), size=list(self.size))
@@ -140,7 +145,7 @@ class Drawing(Additions):
             obeys = "y"
             scene.put("cell", shear_rate=self.uniform(0.5, 3)/self.size[1])
             scene.tags.add("sheared")
-        scene.put("cell", obeys=obeys, stress=[self.uniform(1e3, 1e4)*(axis in obeys) for axis in "xy"],
+        scene.put("cell", obeys=obeys, stress=[self.uniform(5e2, 5e3)*(axis in obeys) for axis in "xy"],
                   mass=self.uniform(0.3, 2), damping_ratio=self.uniform(0.1, 0.5))
         if self.dice.random() < 0.3:
             scene.put("cell", stress_ramp=80*scene.dt)
@@ -164,7 +169,7 @@ class Drawing(Additions):
     def new_row(self, name, axis):
         """Glued grains along a periodic axis, or a flat belt of boxes if it runs or passes the cell."""
         across = 1 - axis
-        n = max(4, round(self.size[axis]/(0.8*self.radius)))
+        n, self.top = max(4, round(self.size[axis]/(0.8*self.radius))), self.low[across] + 0.4*self.radius
         bodies = []
         for k in range(n):
             place = np.empty(2)
@@ -191,23 +196,39 @@ class Drawing(Additions):
                 body = self.new(pieces, velocity=np.array([self.uniform(-1.5, 1.5), self.uniform(-1.5, 1.5)]),
                                 spin=self.uniform(-60, 60))
                 if (i, j) == (0, 0):
-                    # It moves to the walls, or to its neighbour across the border.
-                    body.velocity = (abs(body.velocity) + 0.5)*np.where(self.border < self.low, 1, -1)
                     self.first = body
+                self.approach(body, (i, j))
                 if len(pieces) > 1:
                     self.scene.acts.setdefault(body.id, set()).add("pieces")
-                # No part below the floors; the first grain touches them.
                 body.move(self.off_walls(body))
+        if "lid" in self.floors and 1 in self.grid and "source" not in self.chosen:
+            # It touches the tallest grain.
+            lid, across = self.scene.body(self.scene.groups["wall.lid"]["bodies"][0]), 1 - self.scene.periodic[0]
+            top = max(corners(body)[:, across].max() for body in self.scene.free)
+            lid.move((top - 0.02*self.radius - corners(lid)[:, across].min())*np.eye(2)[across])
+
+    def approach(self, body, place):
+        """Let the first grain move to the walls and to its neighbours across the border, and those to it."""
+        for axis in (0, 1):
+            periodic, moved = axis in self.scene.periodic, self.border[axis] < self.low[axis]
+            ahead, speed = (1 if moved else -1), abs(body.velocity[axis]) + 0.5
+            neighbour = np.eye(2, dtype=int)[axis]*(1 if moved else self.grid[axis] - 1)
+            if place == (0, 0):
+                body.velocity[axis] = ahead*speed
+            elif periodic and place == tuple(neighbour):
+                body.velocity[axis] = -ahead*speed
 
     def off_walls(self, body):
-        """By how much a grain is moved, so that no part is below a floor, and the first one touches all floors."""
+        """By how much a grain is moved, so that no part is below a floor; the first and a single row touch floors."""
         walled = {"plane": (0, 1), "periodic_x": (1,), "periodic_y": (0,)}.get(
             self.container, (1,) if self.floors else ())
         by = np.zeros(2)
         for axis in walled:
-            floor = self.low[axis] + ("rows" in self.scene.tags)*0.4*self.radius
+            floor = self.top if "rows" in self.scene.tags else self.low[axis]
             by[axis] = floor - 0.02*self.radius - corners(body)[:, axis].min()
-        return by if body is self.first else np.maximum(by, 0)
+            touches = body is self.first or (self.grid[axis] == 1 and self.container != "plane")
+            by[axis] = by[axis] if touches else max(by[axis], 0)
+        return by
 
     def shape(self, place, tilt):
         dice, radius = self.dice, self.radius
@@ -250,6 +271,12 @@ class Drawing(Additions):
 
     def finish(self):
         scene = self.scene
+        if self.late:
+            if not scene.named("stage"):
+                scene.tags.add("stages")
+                self.add_stages()
+            scene.put("sink.bin", stage="second")
+            scene.tags.add("stage_of_traffic")
         if {"start_checkpoint", "start_frame"} & self.chosen:
             scene.start = "checkpoint" if "start_checkpoint" in self.chosen else "frame"
             scene.prelude = self.dice.randint(3, 6)*20

@@ -81,7 +81,10 @@ def prelude_of(scene, parts):
     for name in first.named("stage"):
         del first.groups[f"stage.{name}"]
     for name in [name for name, group in first.groups.items() if "stage" in group]:
-        del first.groups[name]["stage"]
+        if name.startswith("sink."):
+            del first.groups[name]
+        else:
+            del first.groups[name]["stage"]
     first.put("integrate", duration=scene.prelude*first.dt)
     first.groups["output"].pop("series_interval", None)
     return [Play(first), Play(parts[0].scene, scene.start), *parts[1:]]
