@@ -202,7 +202,7 @@ class Additions:
     def add_source(self):
         """A square enters beside the first grain, where there is room for one at a place that leaves nothing to chance."""
         scene, half = self.scene, 0.4*self.radius
-        place, velocity = self.low + np.array([1.5, 0.5])*self.pitch, np.array([-2.0, self.uniform(-0.5, 0.5)])
+        place, velocity = self.low + np.array([1.5, 0.5])*self.pitch, np.array([-5.0, self.uniform(-1, 1)])
         if self.container not in WITHOUT_WALLS:
             place = self.low + 0.5*self.pitch - self.down*(0.5*self.pitch + self.radius)
             velocity = 3*self.down
