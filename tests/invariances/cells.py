@@ -17,6 +17,8 @@ def border(scene, dice):
     size = np.array(scene.get("cell", "size"))
     for axis in scene.periodic:
         by[axis] = dice.uniform(0, 1)*size[axis]
+        while crosses_source(scene, axis, by[axis]):
+            by[axis] = dice.uniform(0, 1)*size[axis]
     low = np.array(scene.get("cell", "low")) + by
     other.put("cell", low=list(low))
     rate = scene.get("cell", "shear_rate", 0.0)
@@ -48,6 +50,13 @@ def border(scene, dice):
 def is_relative(scene):
     """Whether the middle of the cell is no frame at constant velocity: its height or its shear changes."""
     return bool({"stress_controlled", "shear_ramp"} & scene.tags)
+
+
+def crosses_source(scene, axis, by):
+    """Whether a border elsewhere crosses the rectangle of a source, which must be within the cell."""
+    low, size = scene.get("cell", "low")[axis] + by, scene.get("cell", "size")[axis]
+    ends = [[scene.get(f"source.{name}", key)[axis] for key in ("low", "high")] for name in scene.named("source")]
+    return any((first - low) % size + (last - first) > size*(1 - 1e-9) for first, last in ends)
 
 
 def fold(body, low, size, axes, jump):

@@ -15,6 +15,7 @@ module polydem_start_from
    use polydem_communicator, only: communicator_t
    use polydem_enter_cell, only: join_copies
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_exchange_bodies, only: find_leaving
    use polydem_file_system, only: exists, is_folder
    use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
    use polydem_gone_bodies, only: find_gone_rows, rows_of
@@ -26,6 +27,7 @@ module polydem_start_from
    use polydem_source_locations, only: place_of
    use polydem_start_materials, only: translate_materials
    use polydem_strings, only: quoted, suggestion, to_text
+   use polydem_vanishing_walls, only: find_release
    use polydem_wall_bodies, only: wall_bodies_t
    use polydem_wall_names, only: find_material_names, find_wall_names
    implicit none
@@ -339,7 +341,12 @@ contains
          end do
       end associate
       call file%close(error)
-      if (.not. allocated(error)) call settle_bodies(simulation, error)
+      if (allocated(error)) return
+      ! The forces at time 0 end here: the balance must know what leaves before the first step.
+      call find_release(simulation)
+      call find_leaving(simulation)
+      simulation%loop%step = -1_lp
+      call settle_bodies(simulation, error)
    end subroutine return_to_state
 
 end module polydem_start_from
