@@ -24,14 +24,12 @@ def border(scene, dice):
     rate = scene.get("cell", "shear_rate", 0.0)
     drift = np.array([-rate*by[1], 0.0])
     profile = scene.get("cell", "profile", False)
-    if rate and RECTANGLES & scene.tags and (scene.start or RECTANGLES & scene.tags != {"source"}):
-        # Rectangles would move relative to the bodies; a body that enters at once does not see it.
+    if rate and ("shear_ramp" in scene.tags or (
+            RECTANGLES & scene.tags and (scene.start or RECTANGLES & scene.tags != {"source"}))):
+        # Rectangles would move relative to the bodies; a body that enters at once does not see it. In a ramp, rows of
+        # copies accelerate against each other, so it matters which one has the bodies.
         by[1], drift, low[1] = 0.0, np.zeros(2), scene.get("cell", "low")[1]
         other.put("cell", low=list(low))
-    if rate and "shear_ramp" in scene.tags:
-        if profile or {"drag", "local_damping"} & scene.tags:
-            return None
-        drift = np.zeros(2)
     inside = dice.random() < 0.5
     for body in other.bodies:
         if not profile and not body.fixed:
@@ -87,7 +85,7 @@ def copies(scene, numbers):
     other.put("cell", size=list(size*numbers))
     if not scale_cell(other, numbers):
         return None
-    jump = 0.0 if "shear_ramp" in scene.tags else rate*size[1]
+    jump = rate*size[1]
     drift = np.array([-0.5*(numbers[1] - 1)*jump, 0.0])
     offsets = [np.array([i, j]) for j in range(numbers[1]) for i in range(numbers[0])]
     ids = copy_bodies(scene, other, offsets, jump, drift)
@@ -102,10 +100,7 @@ def has_copies(scene, sheared):
         return False
     if not sheared:
         return True
-    if RECTANGLES & scene.tags or (scene.prelude and "shear_ramp" in scene.tags):
-        return False
-    moves = scene.get("cell", "profile", False) or {"drag", "local_damping"} & scene.tags
-    return not ("shear_ramp" in scene.tags and moves)
+    return not RECTANGLES & scene.tags
 
 
 def copy_bodies(scene, other, offsets, jump, drift):
