@@ -74,7 +74,7 @@ contains
       reach = maxval(abs(bodies%pieces%turned_polygon(s)), 2)
    end function reach_of
 
-   !> Place of a fixed body on its path through the copies of the cell, (2) [m]; its position in the plane
+   !> Place of a body on its path through the copies of the cell, (2) [m]; its position in the plane
    pure function path_of(bodies, s) result(place)
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body

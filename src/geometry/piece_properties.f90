@@ -4,6 +4,7 @@ module polydem_piece_properties
    use polydem_kinds, only: ip, wp
    use polydem_overlap_measure, only: true_area
    use polydem_polygon, only: clean_polygon, greatest_radius, mass_properties
+   use polydem_sort_reals, only: sort_reals
    use polydem_strings, only: to_text
    implicit none
    private
@@ -63,7 +64,8 @@ contains
       call check_overlaps(joined, ends, areas, centres, problem)
    end subroutine join_pieces
 
-   !> Check that no two pieces overlap.
+   !> Check that no two pieces overlap. Those are compared whose bounds meet: a sweep along the axis along which the
+   !> pieces are more spread out.
    subroutine check_overlaps(joined, ends, areas, centres, problem)
       !> Vertices of all pieces [m], and last vertex of each, (0:number of pieces)
       real(wp), intent(in) :: joined(:, :)
@@ -72,16 +74,32 @@ contains
       real(wp), intent(in) :: areas(:), centres(:, :)
       !> Allocated if two overlap
       character(len=:), allocatable, intent(inout) :: problem
-      integer(ip) :: p, q
+      real(wp) :: low(2, size(areas)), high(2, size(areas))
+      integer(ip) :: ranked(size(areas)), pair(2), least(2), j, k, p, n
+      integer :: axis
 
-      do p = 1_ip, size(areas, kind=ip)
-         do q = p + 1_ip, size(areas, kind=ip)
-            if (.not. overlap_of(p, q) > least_share*min(areas(p), areas(q))) cycle
-            problem = 'its pieces '//to_text(p - 1_ip)//' and '//to_text(q - 1_ip)// &
-               ', counted from 0, overlap; pieces may touch only, as ./polydem import --decompose makes them'
-            return
+      n = size(areas, kind=ip)
+      do p = 1_ip, n
+         low(:, p) = minval(joined(:, ends(p - 1_ip) + 1_ip:ends(p)), 2)
+         high(:, p) = maxval(joined(:, ends(p - 1_ip) + 1_ip:ends(p)), 2)
+      end do
+      axis = maxloc((maxval(high, 2) - minval(low, 2))/sum(high - low, 2), 1)
+      call sort_reals(low(axis, :), ranked)
+      ! The message names the first two that overlap.
+      least = n + 1_ip
+      do k = 1_ip, n
+         do j = k + 1_ip, n
+            if (low(axis, ranked(j)) > high(axis, ranked(k))) exit
+            pair = [min(ranked(j), ranked(k)), max(ranked(j), ranked(k))]
+            if (low(3 - axis, pair(1)) > high(3 - axis, pair(2))) cycle
+            if (low(3 - axis, pair(2)) > high(3 - axis, pair(1))) cycle
+            if (pair(1) > least(1) .or. (pair(1) == least(1) .and. pair(2) > least(2))) cycle
+            if (overlap_of(pair(1), pair(2)) > least_share*minval(areas(pair))) least = pair
          end do
       end do
+      if (least(1) > n) return
+      problem = 'its pieces '//to_text(least(1) - 1_ip)//' and '//to_text(least(2) - 1_ip)// &
+         ', counted from 0, overlap; pieces may touch only, as ./polydem import --decompose makes them'
 
    contains
 

@@ -172,9 +172,10 @@ contains
             load%applied = applied_force(load, walls, bodies, time, gravity)
             yields = time >= load%start .and. time < load%end
             if (.not. yields) then
-               ! What stops a moving wall takes its kinetic energy, as a damping does.
+               ! What stops a moving wall takes its kinetic energy, as a damping does, and the work of half a step that
+               ! the sums have since then.
                if (dt > 0.0_wp) load%sums(of_damping) = load%sums(of_damping) &
-                  - 0.5_wp*load%mass*(load%half - 0.5_wp*dt*load%change)**2/dt
+                  - 0.5_wp*load%mass*(load%half**2 - (0.5_wp*dt*load%change)**2)/dt
                load%speed = 0.0_wp
                load%change = 0.0_wp
             else if (.not. dt > 0.0_wp .or. time - dt < load%start) then

@@ -24,15 +24,16 @@ class Additions:
                 del scene.groups[f"material.{name}"]["friction_coefficient"]
         scene.put("contact_pair.both", materials=["hard", "soft"], stiffness=self.stiffness*self.uniform(0.5, 1.5))
         for body in scene.bodies:
-            body.material = dice.choice((0, 1, 2))
+            body.material = dice.choice((1, 2) if body is self.first else (0, 1, 2))
             if body.material:
                 scene.acts.setdefault(body.id, set()).add("materials")
 
-    def a_wall(self, *without):
-        """A wall that may get a motion or a load, the floor before others."""
+    def a_wall(self):
+        """A wall that may get a motion or a load: the floor before others, and one that has another motion if need be."""
         taken = {group.get("wall") for group in self.scene.groups.values()}
-        names = [name for name in self.floors if name not in taken and name not in without]
-        return names[0] if names else None
+        names = [name for name in self.floors if name not in taken]
+        again = taken and not self.scene.named("load") and (not names or self.dice.random() < 0.5)
+        return self.floors[0] if again and self.floors else names[0] if names else None
 
     def direction(self, wall):
         """Unit vectors along which a wall may move: not along a periodic axis, if it spans the cell."""
@@ -87,7 +88,9 @@ class Additions:
         if along is None:
             return
         end = self.scene.dt*self.scene.steps
-        turn = self.uniform(-5, 5) if self.container == "plane" else 0.0
+        # The velocity of a belt stays along its face.
+        turns = self.container == "plane" and "motion_conveyor" not in self.chosen
+        turn = self.uniform(-5, 5) if turns else 0.0
         rows = [[0, 0, 0, 0], [0.4*end, *(0.3*self.radius*along), turn], [0.8*end, *(-0.2*self.radius*along), 0],
                 [1.5*end, 0, 0, 0.3*turn]]
         self.scene.put("motion.motion_table", pivot=list(self.low))
@@ -99,14 +102,19 @@ class Additions:
             self.drop("load")
             return
         along = self.dice.choice(self.direction(wall))
+        if self.passes:
+            along = np.eye(2)[self.scene.periodic[0]]
         axis = int(along[1] > 0.5)
-        mass, far = self.uniform(0.05, 0.5), axis in self.scene.periodic
-        # At the speed F/c it passes the cell more than once, or some grains
-        steps = self.scene.steps*self.scene.dt
-        speed = self.uniform(1.2, 3)*self.size[axis]/steps if far else self.uniform(0.3, 2)
-        ratio = self.uniform(0.02, 0.2)
+        mass, far = self.uniform(0.2, 1), axis in self.scene.periodic
+        # The speed F/c, to which it tends
+        ratio, speed = self.uniform(0.02, 0.2), self.uniform(0.3, 2)
+        damping = 2*ratio*math.sqrt(self.stiffness*mass)
+        if self.passes:
+            # From rest it passes the cell about twice.
+            time, slow = self.scene.steps*self.scene.dt, mass/damping
+            speed = self.uniform(2, 2.8)*self.size[axis]/(time - slow*(1 - math.exp(-time/slow)))
         sign = self.dice.choice((1, -1)) if far else (-1 if wall == "lid" else 1)
-        force = sign*speed*2*ratio*math.sqrt(self.stiffness*mass)
+        force = sign*speed*damping
         entries = {"wall": wall, "direction": "xy"[axis], "mass": mass, "damping_ratio": ratio}
         if self.dice.random() < 0.3:
             entries.update(stress=force/0.1, width=0.1)
@@ -128,11 +136,15 @@ class Additions:
 
     def add_gate(self):
         """A small wall that some grain touches, until it vanishes."""
-        body = self.dice.choice(self.scene.free)
-        place = body.centre + (0.8*body.reach + 0.15*self.radius)*unit(self.uniform(0, 6.28))
+        # Ahead of the first grain, between its neighbours and off the walls
+        ahead = [1 if axis not in self.scene.periodic or self.border[axis] < self.low[axis] else -1 for axis in (0, 1)]
+        angle = math.atan2(ahead[1], ahead[0]) + self.uniform(-0.2, 0.2)
+        place = self.first.centre + (0.75*self.first.reach + 0.15*self.radius)*unit(angle)
         gate = self.new([regular(place, 0.3*self.radius, 5, self.uniform(0, 1))], fixed=True)
         self.name_wall("gate", [gate], "gate")
-        self.scene.put("wall.gate", vanish_at=(self.dice.randint(5, 20)*10 + 0.5)*self.scene.dt)
+        # A checkpoint of a run in which it has vanished starts no other.
+        first = 13 if "start_checkpoint" in self.chosen else 5
+        self.scene.put("wall.gate", vanish_at=(self.dice.randint(first, 20)*10 + 0.5)*self.scene.dt)
 
     def add_stages(self):
         scene, first = self.scene, self.dice.randint(4, 8)*20
@@ -143,6 +155,7 @@ class Additions:
         if self.container != "stress_controlled" and self.dice.random() < 0.5:
             gravity = np.array(scene.get("forces", "gravity"))
             scene.put("stage.second", gravity=list(0.5*gravity + 20*unit(self.uniform(0, 6.28))))
+            scene.tags.add("stage_gravity")
         if self.dice.random() < 0.3:
             scene.put("stage.second", drag=self.uniform(5, 30))
             scene.tags.add("drag")
@@ -154,10 +167,10 @@ class Additions:
     def rectangle(self):
         """A rectangle smaller than the cell, often across its border."""
         scene, wide = self.scene, self.uniform(0.3, 0.8)*self.size
-        low = self.low + self.size*np.array([self.uniform(0, 1), self.uniform(0, 1)]) - 0.5*wide
+        low = self.border + self.size*np.array([self.uniform(0, 1), self.uniform(0, 1)]) - 0.5*wide
         for axis in scene.periodic:
             if self.dice.random() < 0.6:
-                low[axis] = (self.low[axis] + self.dice.choice((0, 1))*self.size[axis]
+                low[axis] = (self.border[axis] + self.dice.choice((0, 1))*self.size[axis]
                              - wide[axis]*self.uniform(0.2, 0.8))
         return {"low": list(low), "high": list(low + wide)}
 
@@ -187,39 +200,42 @@ class Additions:
         self.scene.put("sample", area="rectangle", **self.rectangle())
 
     def add_source(self):
-        """A square enters where there is room for one at a place that leaves nothing to chance."""
-        scene, half = self.scene, 0.5*self.radius
-        place = self.low + np.array([1.5, 0.5])*self.pitch
+        """A square enters beside the first grain, where there is room for one at a place that leaves nothing to chance."""
+        scene, half = self.scene, 0.4*self.radius
+        place, velocity = self.low + np.array([1.5, 0.5])*self.pitch, np.array([-5.0, self.uniform(-1, 1)])
         if self.container not in WITHOUT_WALLS:
-            away = -self.down
-            place = self.low + 0.5*self.size + away*(0.5*self.size[int(abs(away[1]) > 0.5)] + 1.2*self.radius)
-            if scene.periodic:
-                place[scene.periodic[0]] = self.low[scene.periodic[0]] + self.uniform(0, 1)*self.size[scene.periodic[0]]
+            place = self.low + 0.5*self.pitch - self.down*(0.5*self.pitch + self.radius)
+            velocity = 3*self.down
         # The program wants room for its circle in the rectangle.
-        wide, interval = math.sqrt(2)*half*(1 + 1e-12), self.dice.choice((20, 40))
+        wide, interval = math.sqrt(2)*half*(1 + 1e-12), 20
         for axis in scene.periodic:
-            first, last = self.low[axis] + 1.001*wide, self.low[axis] + self.size[axis] - 1.001*wide
+            first, last = self.border[axis] + 1.001*wide, self.border[axis] + self.size[axis] - 1.001*wide
+            place[axis] -= math.floor((place[axis] - self.border[axis])/self.size[axis])*self.size[axis]
             place[axis] = min(max(place[axis], first), last)
+        # A run from a result has no density of its scene.
         outline = [-half, -half, half, -half, half, half, -half, half]
-        velocity = 2*self.down if self.container not in WITHOUT_WALLS else unit(self.uniform(0, 6.28))
         scene.put("source.feed", low=list(place - wide), high=list(place + wide), shape="outline",
-                  outline=outline, angle=[0.0, 0.0], velocity=list(velocity), interval=interval)
+                  outline=outline, angle=[0.0, 0.0], velocity=list(velocity), interval=interval, density=self.density)
         if self.container == "sheared":
             # One enters at once: later, its place would differ where the same shear is seen from another height.
             scene.put("source.feed", count=len(scene.free) + 1)
         else:
-            scene.put("source.feed", rate=self.uniform(0.2, 0.9)/(interval*scene.dt))
+            scene.put("source.feed", rate=self.uniform(1.01, 1.2)/(interval*scene.dt))
 
     def add_sink(self):
         scene = self.scene
-        body = self.dice.choice(scene.free)
-        wide = self.uniform(0.6, 1.2)*self.radius
-        ahead = self.uniform(0, 0.7)*scene.steps*scene.dt*body.velocity
-        low = body.centre + ahead + self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
+        body = self.first if self.dice.random() < 0.8 else self.dice.choice(scene.free)
+        wide, interval = self.uniform(1.0, 1.5)*self.radius, self.dice.choice((20, 40))
+        ahead = self.uniform(0, 100)*scene.dt*body.velocity
+        low = body.centre + ahead + 0.3*self.radius*np.array([self.uniform(-1, 1), self.uniform(-1, 1)]) - wide
         if scene.periodic and self.dice.random() < 0.6:
+            # Across the border that is nearer
             axis = self.dice.choice(scene.periodic)
-            low[axis] = self.low[axis] + self.dice.choice((0, 1))*self.size[axis] - wide*self.uniform(0.5, 1.5)
-        scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=self.dice.choice((20, 40, 60)))
+            sides = [self.border[axis], self.border[axis] + self.size[axis]]
+            low[axis] = min(sides, key=lambda side: abs(side - body.centre[axis])) - wide*self.uniform(0.8, 1.2)
+        # Else what is there leaves before the first step.
+        self.late = self.dice.random() < 0.7
+        scene.put("sink.bin", low=list(low), high=list(low + 2*wide), interval=interval)
 
     def add_cohesion(self):
         self.scene.put("forces", cohesion=self.uniform(0.002, 0.02)*self.stiffness)

@@ -17,6 +17,8 @@ def border(scene, dice):
     size = np.array(scene.get("cell", "size"))
     for axis in scene.periodic:
         by[axis] = dice.uniform(0, 1)*size[axis]
+        while crosses_source(scene, axis, by[axis]):
+            by[axis] = dice.uniform(0, 1)*size[axis]
     low = np.array(scene.get("cell", "low")) + by
     other.put("cell", low=list(low))
     rate = scene.get("cell", "shear_rate", 0.0)
@@ -50,6 +52,13 @@ def is_relative(scene):
     return bool({"stress_controlled", "shear_ramp"} & scene.tags)
 
 
+def crosses_source(scene, axis, by):
+    """Whether a border elsewhere crosses the rectangle of a source, which must be within the cell."""
+    low, size = scene.get("cell", "low")[axis] + by, scene.get("cell", "size")[axis]
+    ends = [[scene.get(f"source.{name}", key)[axis] for key in ("low", "high")] for name in scene.named("source")]
+    return any((first - low) % size + (last - first) > size*(1 - 1e-9) for first, last in ends)
+
+
 def fold(body, low, size, axes, jump):
     """Put a body into the cell, with the velocity of the border."""
     for axis in axes:
@@ -81,7 +90,7 @@ def copies(scene, numbers):
     other.put("cell", size=list(size*numbers))
     if not scale_cell(other, numbers):
         return None
-    jump = 0.0 if "shear_ramp" in scene.tags else rate*size[1]
+    jump = rate*size[1]
     drift = np.array([-0.5*(numbers[1] - 1)*jump, 0.0])
     offsets = [np.array([i, j]) for j in range(numbers[1]) for i in range(numbers[0])]
     ids = copy_bodies(scene, other, offsets, jump, drift)
@@ -96,7 +105,7 @@ def has_copies(scene, sheared):
         return False
     if not sheared:
         return True
-    return not RECTANGLES & scene.tags and not (scene.prelude and "shear_ramp" in scene.tags)
+    return not RECTANGLES & scene.tags
 
 
 def copy_bodies(scene, other, offsets, jump, drift):

@@ -174,6 +174,10 @@ def frame_difference(scene, answer, case, frame, twin, bound):
             case.turned = dict(zip(frame.id[one], turn))
         turn = turn - np.array([case.turned.get(identifier, 0.0) for identifier in frame.id[one]])
     spin = twin.spin[two] - change.sense/change.time*frame.spin[one]
+    if case.before and frame.step == case.before:
+        # The velocity of a motion that begins shows from the first step on.
+        walls = np.isin(frame.id[one], list(answer.fixed))
+        velocity[walls], spin[walls] = 0.0, 0.0
     tolerances = (bound.place[frame.step] + case.loose*bound.size, bound.velocity[frame.step] + case.loose*bound.speed)
     # Walls that span a periodic axis and fixed bodies with motions are compared, too: by where they are.
     checks = (("position", np.hypot(*place.T), tolerances[0]), ("angle", abs(turn)*bound.size, tolerances[0]),

@@ -81,31 +81,37 @@ def prelude_of(scene, parts):
     for name in first.named("stage"):
         del first.groups[f"stage.{name}"]
     for name in [name for name, group in first.groups.items() if "stage" in group]:
-        del first.groups[name]["stage"]
+        if name.startswith("sink."):
+            del first.groups[name]
+        else:
+            del first.groups[name]["stage"]
     first.put("integrate", duration=scene.prelude*first.dt)
     first.groups["output"].pop("series_interval", None)
     return [Play(first), Play(parts[0].scene, scene.start), *parts[1:]]
 
 
 def touching_pairs(scene, answer):
-    """Pairs of tags that act on a body that touches another one."""
+    """Pairs of capabilities that act on a body that touches others: on itself, or on those that it touches."""
     single = set().union(*scene.acts.values()) if scene.acts else set()
     guests = {"source": {int(i) for frame in answer.frames for i in frame.id} - {body.id for body in scene.bodies},
               "sink": {int(i) for i in answer.departures.get("id", ())}}
-    everywhere = scene.tags - single - {"source", "sink", "periodic_x", "periodic_y", "periodic_xy", "sheared"}
+    cells = scene.tags & {"periodic_x", "periodic_y", "periodic_xy", "sheared"}
+    everywhere = scene.tags - single - guests.keys() - cells
     found = set()
     for frame in answer.frames:
+        acts = {}
         for one, two in frame.contacts if frame.contacts is not None else ():
-            act = everywhere | scene.acts.get(int(one), set()) | scene.acts.get(int(two), set())
-            act |= {tag for tag, ids in guests.items() if int(one) in ids or int(two) in ids}
-            if frame.size is not None:
-                a, b = frame.row(one), frame.row(two)
-                apart = abs(frame.position[a] - frame.position[b])
-                if (int(one) not in answer.fixed and int(two) not in answer.fixed) or "rows" in act:
-                    across = [axis for axis in scene.periodic if apart[axis] > 0.5*frame.size[axis]]
-                    if across and ("sheared" not in scene.tags or 1 in across):
-                        act |= scene.tags & {"periodic_x", "periodic_y", "periodic_xy", "sheared"}
-            found |= set(itertools.combinations(sorted(act), 2))
+            ends = int(one), int(two)
+            act = set().union(*(scene.acts.get(k, set()) for k in ends))
+            act |= {tag for tag, ids in guests.items() if ids & set(ends)}
+            if frame.size is not None and (not answer.fixed & set(ends) or "rows" in act):
+                apart = abs(frame.position[frame.row(one)] - frame.position[frame.row(two)])
+                across = [axis for axis in scene.periodic if apart[axis] > 0.5*frame.size[axis]]
+                if across and ("sheared" not in cells or 1 in across):
+                    act |= cells
+            for k in set(ends) - answer.fixed:
+                acts.setdefault(k, set(everywhere)).update(act)
+        found |= {pair for act in acts.values() for pair in itertools.combinations(sorted(act), 2)}
     return found
 
 

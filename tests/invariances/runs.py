@@ -161,6 +161,9 @@ def read(folder, answer):
     """Read all segments of a result."""
     for path in sorted(folder.glob("trajectory_*.h5*")):
         with h5py.File(path, "r") as file:
+            if "bodies" not in file:
+                # All have left before.
+                continue
             read_bodies(file, answer)
             read_frames(file, answer)
             for name, target in (("energy_balance", answer.balance), ("series", answer.series),

@@ -28,8 +28,8 @@ def split(scene, dice, how):
     shorten(first, 0, step)
     shorten(second, step, scene.steps)
     forget(second, step)
-    # Motions and the turn of gravity are functions of another time.
-    moved = "turning" in scene.tags or bool(scene.named("motion"))
+    # Motions, the turn of gravity and the shift of copies are functions of another time.
+    moved = bool({"turning", "sheared"} & scene.tags or scene.named("motion"))
     return Case([Play(first), Play(second, how)], before=step, exact=how == "checkpoint" and not moved,
                 loose=0.03 if how == "frame" else 0.0, energies=False)
 

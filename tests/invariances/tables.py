@@ -18,7 +18,7 @@ def read_table(name):
 
 def impossible_pairs():
     """Pairs of capabilities that no scene has."""
-    return {tags | {word} for tags, word in read_table("impossible")}
+    return frozenset(tags | {word} for tags, word in read_table("impossible"))
 
 
 def excepted(scene, name, table):

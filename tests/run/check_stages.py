@@ -183,18 +183,44 @@ def walls_do_not_jump_when_motions_change(case):
 
 
 def walls_that_have_vanished_stay_away(case):
-    """Finds a start from a checkpoint that brings the bodies of such a wall back."""
-    text = SCENE.format(seed=1).replace("high = 0.049, 0.11 /", "high = 0.049, 0.11 vanish_at = {} /")
-    rest = OUTPUT.format(duration="duration = 7.8125e-3", scheme="")
-    start = FOUND.replace("&wall name = 'lid' outline = 'result' /\n", "")
-    start += "&scene name = 'result' start_from = '{}' /\n"
-    case.run(text.format(1e-3) + rest, "gone")
-    message = case.run(start.format("gone") + rest, "back", code=BAD_INPUT)
-    assert "a wall that has vanished" in message and "'gone:-1'" in message, message
-    output = case.run(start.format("gone:-1") + rest, "away")
-    assert re.search(r"^bodies +63 ", output, re.MULTILINE), output
-    case.run(text.format(1.0) + rest, "closed")
-    assert re.search(r"^bodies +64 ", case.run(start.format("closed") + rest, "open"), re.MULTILINE)
+    """Finds a start that brings the bodies of such a wall back, or gives a body the state or the springs of another.
+
+    Grains enter after the floor, which vanishes, so that they have other places among all bodies then.
+    """
+    text = SCENE.format(seed=1).replace("high = 0.1, 0 /", "high = 0.1, 0 vanish_at = {} /")
+    text += "&source name = 'rain' low = -0.049, 0.12 high = 0.049, 0.2 count = 80 interval = 20 velocity = 0, -2 /\n"
+    rest = OUTPUT.format(duration="duration = {}", scheme="{}")
+    start = FOUND.replace("&wall name = 'floor' outline = 'result' /\n", "")
+    start += "&forces stiffness = 2e5 friction_coefficient = 0.5 /\n&scene name = 'result' start_from = '{}' /\n"
+    half, whole = 15.625e-3, 31.25e-3
+    for scheme in ("scheme = 'gear'", "accumulation = 'compensated'", ""):
+        case.run(text.format(half / 2) + rest.format(half, scheme), "gone", "--force")
+        case.run(text.format(half / 2) + rest.format(whole, scheme), "through", "--force")
+        with h5py.File("gone/checkpoint_1.h5") as file:
+            assert any(file["pairs/tangential"][()])
+        expected = last_poses("through")
+        for ranks in (None, 2)[:2 if case.parallel else 1]:
+            output = case.run(start.format("gone") + rest.format(half, scheme), "away", "--force",
+                              **({"ranks": ranks} if ranks else {}))
+            assert re.search(r"^bodies +83 ", output, re.MULTILINE), output
+            assert last_poses("away") == expected
+    output = case.run(start.format("gone:-1") + rest.format(half, scheme), "away_from_frame")
+    assert re.search(r"^bodies +83 ", output, re.MULTILINE), output
+    case.run(text.format(1.0) + rest.format(half, scheme), "closed")
+    output = case.run(start.format("closed") + rest.format(half, scheme), "open")
+    assert re.search(r"^bodies +84 ", output, re.MULTILINE), output
+
+
+def last_poses(folder):
+    """Identifier -> pose and velocity of each free body of the last frame."""
+    with h5py.File(max(Path(folder).glob("trajectory_*.h5"))) as file:
+        frames, fixed = file["frames"], set(file["bodies/id"][()][file["bodies/fixed"][()] == 1])
+        # A run with sources has all frames in one list.
+        rows = slice(*frames["start"][-2:]) if "start" in frames else -1
+        names = frames["id"][rows] if "start" in frames else file["bodies/id"][()]
+        columns = [frames[name][rows] for name in ("position", "angle", "velocity", "angular_velocity")]
+        return {int(name): [column[k].tobytes() for column in columns]
+                for k, name in enumerate(names) if name not in fixed}
 
 
 def a_stage_that_ends_at_once_is_told(case):

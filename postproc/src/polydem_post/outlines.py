@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .base.polygons import FloatArray
-from .base.result_file import ResultError, cannot_read
+from .base.result_file import ResultError, cannot_read, insist_on_file
 
 #: Properties of a body that GeoJSON may give, besides its outline
 PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id", "material")
@@ -52,6 +52,7 @@ def read_outlines(path: Path, form: str = "") -> list[Outline]:
         raise ResultError(f"{path}: its name does not say the format; give --from "
                           f"{', '.join(READERS)}")
     try:
+        insist_on_file(path)
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise cannot_read(path, error) from error

@@ -2,9 +2,11 @@
 !>
 !> The potential energy of gravity and its impulse are those of the present acceleration, as if it had always acted. So
 !> the values at the start change with it: by the jump of the potential energy, and by the impulse that the former
-!> acceleration gave in place of the new one. The residuals do not change.
+!> acceleration gave in place of the new one. The residuals do not change. Like the potential energy, its jump counts
+!> the whole path through the copies of a cell.
 module polydem_changed_gravity
    use polydem_bodies, only: bodies_t
+   use polydem_bodies_in_cell, only: path_of
    use polydem_communicator, only: communicator_t
    use polydem_energy_balance, only: energy_balance_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
@@ -32,7 +34,7 @@ contains
       integer(ip) :: k
 
       do k = 1_ip, size(bodies%free, kind=ip)
-         associate (m => bodies%mass(bodies%free(k)), x => bodies%position(:, bodies%free(k)))
+         associate (m => bodies%mass(bodies%free(k)), x => path_of(bodies, bodies%free(k)))
             call partial(1)%add(m)
             call partial(2)%add(m*x(1))
             call partial(3)%add(m*x(2))

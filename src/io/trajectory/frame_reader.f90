@@ -21,8 +21,6 @@ module polydem_frame_reader
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Whether a checkpoint has the cells that bodies have crossed, and the shifts of the borders that they crossed
       logical :: has_images = .false., has_slides = .false.
-      !> Whether a checkpoint has bodies of walls that have vanished
-      logical :: has_gone_walls = .false.
       !> Greatest number of pieces of a body, in a checkpoint
       integer(ip) :: most_pieces = 1_ip
    end type surroundings_t
@@ -197,7 +195,7 @@ contains
       !> Names the file and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      integer(ip), allocatable :: gone(:), most(:)
+      integer(ip), allocatable :: most(:)
       real(dp), allocatable :: values(:), rows(:, :), shift(:), jump(:)
 
       call file%open(path, error)
@@ -218,10 +216,8 @@ contains
          call file%read('/frames/jump', jump, error, rows=[row, 1_lp])
       end if
       if (file%has('/vertices/piece', error)) call file%read('/run/most_pieces', most, error)
-      if (file%has('/run/gone', error)) call file%read('/run/gone', gone, error)
       call file%close(error)
       if (allocated(error)) return
-      if (allocated(gone)) found%has_gone_walls = any(gone == 1_ip)
       if (allocated(values)) then
          if (size(values) >= 2) found%size = real(values(1:2), wp)
       end if

@@ -10,6 +10,7 @@ module polydem_checkpoint_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: far, ip, lp, wp
    use polydem_serializer, only: serializer_t
+   use polydem_sort, only: place_in
    use polydem_strings, only: to_text
    implicit none
    private
@@ -24,6 +25,8 @@ module polydem_checkpoint_bodies
       integer(ip) :: n_all = 0_ip, last_id = 0_ip
       !> Rows of the bodies, and of their vertices, ascending
       integer(lp), allocatable :: row(:), vertex(:)
+      !> Indices of the bodies among all
+      integer(ip), allocatable :: index(:)
       !> Number of vertices of each body
       integer(ip), allocatable :: corners(:)
    end type taken_t
@@ -62,20 +65,22 @@ contains
 
    !> Read the bodies of a rank: all fixed bodies, and a share of the free ones. The rows of /bodies stay chosen, so
    !> that columns of other objects over these bodies can follow.
-   subroutine read_bodies(serializer, comm, bodies)
+   subroutine read_bodies(serializer, comm, bodies, gone)
       !> Serializer; its `error` holds a failure, also if the bodies are invalid
       class(serializer_t), intent(inout) :: serializer
       class(communicator_t), intent(in) :: comm
       !> On entry the bodies of the scene, or at least their greatest number of pieces; on return those of the
       !> checkpoint
       type(bodies_t), intent(inout) :: bodies
+      !> Rows of bodies that are left out, ascending; default: none
+      integer(ip), intent(in), optional :: gone(:)
       type(taken_t) :: taken
       integer(ip) :: k, last_id(1), most_pieces
       integer :: isa
       logical :: has_materials
       type(cell_t) :: cell
 
-      call choose_bodies(serializer, comm, taken)
+      call choose_bodies(serializer, comm, taken, gone)
       if (allocated(serializer%error)) return
       last_id = 0_ip
       call serialize_last(serializer, last_id)
@@ -89,7 +94,7 @@ contains
       bodies%last_id = max(last_id(1), taken%last_id)
       bodies%isa = isa
       call set_cell(bodies, cell)
-      bodies%global_index = int(taken%row, ip)
+      bodies%global_index = taken%index
       call serializer%choose_rows('/bodies/', taken%row)
       call serializer%choose_rows('/vertices/', taken%vertex)
       call serialize_constants(serializer, bodies)
@@ -104,11 +109,13 @@ contains
 
    !> Choose the bodies that a rank takes: all fixed ones, and the free ones of one block of rows. For this it looks
    !> through all rows of a few columns, some at a time.
-   subroutine choose_bodies(serializer, comm, taken)
+   subroutine choose_bodies(serializer, comm, taken, gone)
       class(serializer_t), intent(inout) :: serializer
       class(communicator_t), intent(in) :: comm
       !> The bodies
       type(taken_t), intent(out) :: taken
+      !> Rows of bodies that no rank takes, ascending
+      integer(ip), intent(in), optional :: gone(:)
       integer(ip), allocatable :: id(:), fixed(:), corners(:)
       logical, allocatable :: is_taken(:)
       integer(lp), allocatable :: row(:)
@@ -121,7 +128,7 @@ contains
       if (allocated(serializer%error)) return
       taken%n_all = int(n, ip)
       taken%last_id = -huge(1_ip)
-      allocate (taken%row(0), taken%vertex(0), taken%corners(0))
+      allocate (taken%row(0), taken%index(0), taken%vertex(0), taken%corners(0))
       vertex = 0_lp
       do first = 0_lp, max(0_lp, n - 1_lp), most_rows
          row = [(k, k=first + 1_lp, min(n, first + most_rows))]
@@ -140,6 +147,7 @@ contains
             '/bodies/id does not ascend')
          if (allocated(serializer%error)) return
          is_taken = fixed == 1_ip .or. ((row - 1_lp)*int(comm%size, lp))/n == int(comm%rank, lp)
+         if (present(gone)) is_taken(pack(gone - first, gone > first .and. gone <= first + size(row))) = .false.
          taken%row = [taken%row, pack(row, is_taken)]
          taken%corners = [taken%corners, pack(corners, is_taken)]
          call append_vertices(is_taken, corners, vertex, taken%vertex)
@@ -147,6 +155,10 @@ contains
       end do
       if (vertex < n_vertices) call raise(serializer%error, input_error, &
          '/pieces/corners does not add up to the rows of /vertices/position')
+      taken%index = int(taken%row, ip)
+      if (.not. present(gone)) return
+      taken%n_all = int(n, ip) - size(gone, kind=ip)
+      taken%index = [(taken%index(k) - place_in(gone, taken%index(k)) + 1_ip, k=1_lp, size(taken%index, kind=lp))]
    end subroutine choose_bodies
 
    !> Append the rows of the vertices of those bodies that are taken.

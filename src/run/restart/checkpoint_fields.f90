@@ -9,6 +9,7 @@ module polydem_checkpoint_fields
    use polydem_balance_state, only: serialize_balance, serialize_contributions
    use polydem_begin_stage, only: continue_stages
    use polydem_bodies, only: piece_identifiers
+   use polydem_cell, only: shear_cell
    use polydem_cell_load, only: serialize_cell
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
@@ -22,7 +23,7 @@ module polydem_checkpoint_fields
    use polydem_replace_bodies, only: settle_bodies
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: simulation_t, time_of
    use polydem_vanishing_walls, only: find_release
    use polydem_wall, only: has_table, hash_of_tables
    use polydem_wall_load, only: serialize_loads
@@ -121,6 +122,9 @@ contains
          if (allocated(s%traffic)) call s%traffic%serialize(s%step, serializer)
          if (allocated(s%walls%loads)) call serialize_loads(s%walls%loads, serializer)
          if (allocated(s%bodies%cell%load)) call serialize_cell(s%bodies%cell, serializer)
+         ! Bodies may enter before the next step.
+         if (serializer%is_reading .and. .not. allocated(s%bodies%cell%load)) &
+            call shear_cell(s%bodies%cell, time_of(s), time_of(s))
          shift = s%bodies%cell%shift
          jump = s%bodies%cell%jump
          if (s%bodies%cell%is_sheared .and. .not. serializer%is_reading) then

@@ -2,7 +2,8 @@
 !>
 !> A checkpoint has the whole state. The run goes on from it as the run of the result would, at time 0: contact history,
 !> accelerations and state of the integrator are those of the checkpoint. The forces at time 0 follow from a copy of the
-!> history, since evaluating them changes it. A frame has poses and velocities only.
+!> history, since evaluating them changes it. A frame has poses and velocities only. Bodies of walls that have vanished
+!> are left out.
 module polydem_start_from
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_bodies_in_cell, only: set_cell
@@ -14,8 +15,10 @@ module polydem_start_from
    use polydem_communicator, only: communicator_t
    use polydem_enter_cell, only: join_copies
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_exchange_bodies, only: find_leaving
    use polydem_file_system, only: exists, is_folder
    use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
+   use polydem_gone_bodies, only: find_gone_rows, rows_of
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_replace_bodies, only: settle_bodies
    use polydem_result_files, only: checkpoint_path, n_checkpoints, segment_path
@@ -24,6 +27,7 @@ module polydem_start_from
    use polydem_source_locations, only: place_of
    use polydem_start_materials, only: translate_materials
    use polydem_strings, only: quoted, suggestion, to_text
+   use polydem_vanishing_walls, only: find_release
    use polydem_wall_bodies, only: wall_bodies_t
    use polydem_wall_names, only: find_material_names, find_wall_names
    implicit none
@@ -42,6 +46,8 @@ module polydem_start_from
       character(len=:), allocatable :: note
       !> What it says of its periodic cell and of pieces
       type(surroundings_t) :: around
+      !> Rows of the bodies of a checkpoint that belong to walls that have vanished, ascending
+      integer(ip), allocatable :: gone(:)
    end type origin_t
 
 contains
@@ -86,9 +92,7 @@ contains
          call find_checkpoint(folder, origin, error)
       end if
       if (.not. allocated(error)) call read_surroundings(origin%path, origin%row, origin%around, error)
-      if (origin%around%has_gone_walls) call raise(error, input_error, origin%path// &
-         ' has the bodies of a wall that has vanished, and they would be there again. Start from a frame, which '// &
-         'has them no more, such as '//quoted(folder//':-1'))
+      if (.not. (allocated(error) .or. origin%is_frame)) call find_gone_rows(origin%path, origin%gone, error)
       if (allocated(error)) call blame(settings, error)
    end subroutine find_origin
 
@@ -175,7 +179,7 @@ contains
          call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
-         call read_bodies(file, comm, bodies)
+         call read_bodies(file, comm, bodies, origin%gone)
          call file%close(error)
          if (.not. allocated(error)) call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
       end if
@@ -276,7 +280,7 @@ contains
       call open_start(simulation, file, origin, error)
       if (allocated(error) .or. origin%is_frame) return
       ! Here the state of the integrator is only tried.
-      call file%choose_rows('/bodies/', int(simulation%bodies%global_index, lp))
+      call file%choose_rows('/bodies/', rows_of(simulation%bodies%global_index, origin%gone))
       call simulation%motion%integrator%serialize(file)
       if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
          call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
@@ -316,7 +320,7 @@ contains
       if (allocated(error) .or. origin%is_frame) return
       associate (bodies => simulation%bodies)
          before = bodies
-         call file%choose_rows('/bodies/', int(bodies%global_index, lp))
+         call file%choose_rows('/bodies/', rows_of(bodies%global_index, origin%gone))
          ! The result may have had no cell, or one without shear.
          if (.not. origin%around%has_images .and. allocated(bodies%image)) deallocate (bodies%image)
          if (.not. origin%around%has_slides .and. allocated(bodies%slid)) deallocate (bodies%slid)
@@ -337,7 +341,12 @@ contains
          end do
       end associate
       call file%close(error)
-      if (.not. allocated(error)) call settle_bodies(simulation, error)
+      if (allocated(error)) return
+      ! The forces at time 0 end here: the balance must know what leaves before the first step.
+      call find_release(simulation)
+      call find_leaving(simulation)
+      simulation%loop%step = -1_lp
+      call settle_bodies(simulation, error)
    end subroutine return_to_state
 
 end module polydem_start_from

@@ -59,8 +59,9 @@ contains
       !> Depth of an overlap that does not count [m]
       real(wp), intent(in) :: tolerance
 
-      are_apart = has_separating_edge(a, b, tolerance)
-      if (.not. are_apart) are_apart = has_separating_edge(b, a, tolerance)
+      ! b is a wall, which has few edges.
+      are_apart = has_separating_edge(b, a, tolerance)
+      if (.not. are_apart) are_apart = has_separating_edge(a, b, tolerance)
    end function are_apart
 
    !> Whether all corners of b are beyond an edge of a, or inside by less than `tolerance`
@@ -70,26 +71,28 @@ contains
 
       has_one = .true.
       do k = 1, size(a, 2)
-         if (deepest(a, k, b) <= tolerance) return
+         if (.not. has_deep_point(a, k, b, tolerance)) return
       end do
       has_one = .false.
    end function has_separating_edge
 
-   !> Greatest distance of points from the line of edge k of an outline, positive on its inner side [m]
-   pure real(wp) function deepest(outline, k, points)
-      real(wp), intent(in) :: outline(:, :), points(:, :)
+   !> Whether a point is farther than `depth` from the line of edge k of an outline, on its inner side
+   pure logical function has_deep_point(outline, k, points, depth) result(has_one)
+      real(wp), intent(in) :: outline(:, :), points(:, :), depth
       integer, intent(in) :: k
-      real(wp) :: edge(2), length
-      integer :: j
+      real(wp) :: area, edge(2)
+      integer :: j, next
 
-      edge = outline(:, modulo(k, size(outline, 2)) + 1) - outline(:, k)
-      length = hypotenuse(edge(1), edge(2))
-      deepest = -huge(1.0_wp)
+      next = merge(1, k + 1, k == size(outline, 2))
+      edge = outline(:, next) - outline(:, k)
+      has_one = .true.
       do j = 1, size(points, 2)
-         deepest = max(deepest, (edge(1)*(points(2, j) - outline(2, k)) &
-                                 - edge(2)*(points(1, j) - outline(1, k)))/length)
+         area = edge(1)*(points(2, j) - outline(2, k)) - edge(2)*(points(1, j) - outline(1, k))
+         if (is_clear(area, edge, depth)) return
+         if (area/hypotenuse(edge(1), edge(2)) > depth) return
       end do
-   end function deepest
+      has_one = .false.
+   end function has_deep_point
 
    !> Whether a convex outline contains all points with a clearance, which is negative if they may lie outside a little
    pure logical function contains_all(outline, points, clearance)
@@ -97,20 +100,34 @@ contains
       real(wp), intent(in) :: outline(:, :), points(:, :)
       !> Least distance from the edges [m]
       real(wp), intent(in) :: clearance
-      real(wp) :: edge(2), length
-      integer :: j, k
+      real(wp) :: area, edge(2)
+      integer :: j, k, next
 
       contains_all = .false.
       do k = 1, size(outline, 2)
-         edge = outline(:, modulo(k, size(outline, 2)) + 1) - outline(:, k)
-         length = hypotenuse(edge(1), edge(2))
+         next = merge(1, k + 1, k == size(outline, 2))
+         edge = outline(:, next) - outline(:, k)
          do j = 1, size(points, 2)
-            if (edge(1)*(points(2, j) - outline(2, k)) - edge(2)*(points(1, j) - outline(1, k)) < clearance*length) &
-               return
+            area = edge(1)*(points(2, j) - outline(2, k)) - edge(2)*(points(1, j) - outline(1, k))
+            if (is_clear(area, edge, clearance)) cycle
+            if (area < clearance*hypotenuse(edge(1), edge(2))) return
          end do
       end do
       contains_all = .true.
    end function contains_all
+
+   !> Whether a point is farther from the line of an edge than a distance by so much that the length of the edge, which
+   !> takes long to compute, need not be known
+   pure logical function is_clear(area, edge, distance)
+      !> Cross product of the edge and the arm of the point [m2]
+      real(wp), intent(in) :: area
+      !> The edge, (2) [m]
+      real(wp), intent(in) :: edge(2)
+      !> The distance, negative on the outer side [m]
+      real(wp), intent(in) :: distance
+
+      is_clear = area > max(0.0_wp, 2.0_wp*distance*(abs(edge(1)) + abs(edge(2))))
+   end function is_clear
 
    !> Distance of a point from a convex polygon; 0 inside [m]
    pure real(wp) function distance_to(corners, point) result(distance)

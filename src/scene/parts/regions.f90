@@ -92,13 +92,17 @@ contains
       type(region_t), intent(inout) :: region
       !> Its text is allocated if a wall crosses the region
       type(problem_t), intent(inout) :: problem
+      real(wp) :: rounding
       integer(ip) :: k
 
+      rounding = rounding_of(region)
       associate (corners => region%corners)
          call region%obstacles%start(minval(corners, 2), maxval(corners, 2), 2.0_wp*loose_spacing(group))
          do k = 1_ip, walls%n
-            if (are_apart(corners, walls%polygon(k), rounding_of(region))) cycle
-            if (contains_all(corners, walls%polygon(k), -rounding_of(region))) then
+            ! The bodies of the wall around a convex region are outside it, behind its edges.
+            if (group%region == 'inside' .and. parts%walls(wall_of(k))%name == group%wall) cycle
+            if (are_apart(corners, walls%polygon(k), rounding)) cycle
+            if (contains_all(corners, walls%polygon(k), -rounding)) then
                call region%obstacles%add(walls%polygon(k))
             else
                problem%key = 'region'

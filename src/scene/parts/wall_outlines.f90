@@ -258,16 +258,16 @@ contains
       real(wp), intent(in) :: thickness
       type(polygon_list_t), intent(inout) :: polygons
       type(problem_t), intent(inout) :: problem
-      real(wp) :: miter(2, size(corners, 2)), outer(2, size(corners, 2)), most
+      real(wp) :: miter(2, size(corners, 2)), outer(2, size(corners, 2)), least, most
       integer :: k, next, n, n_faces
 
       problem%key = 'vertices'
       n = size(corners, 2)
       n_faces = merge(n, n - 1, closed)
+      least = nothing*maxval(abs(corners)) + tiny(1.0_wp)
       do k = 1, n_faces
          next = modulo(k, n) + 1
-         if (hypotenuse(corners(1, next) - corners(1, k), corners(2, next) - corners(2, k)) > &
-             nothing*maxval(abs(corners)) + tiny(1.0_wp)) cycle
+         if (hypotenuse(corners(1, next) - corners(1, k), corners(2, next) - corners(2, k)) > least) cycle
          problem%text = 'is a line of zero length from '//list_text(corners(:, k))//' to the same point; for '// &
             'example '//list_text(corners(:, k) + [max(1.0_wp, 10.0_wp*thickness), 0.0_wp])//' is another'
          return

@@ -8,7 +8,7 @@ from dataclasses import MISSING, asdict, astuple, fields
 from pathlib import Path
 
 from polydem_post.base.new_file import new_file
-from polydem_post.base.result_file import ResultError, cannot_read
+from polydem_post.base.result_file import ResultError, cannot_read, insist_on_file
 
 _KINDS = {"str": str, "int": int, "float": float}
 
@@ -25,6 +25,7 @@ def heading_of(path: Path) -> list[str]:
 
 def _read(path: Path) -> tuple:
     try:
+        insist_on_file(Path(path))
         with Path(path).open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             rows = list(reader)

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from polydem_post.base.result_file import ResultError, cannot_read
+from polydem_post.base.result_file import ResultError, cannot_read, insist_on_file
 
 #: Words of a namelist: texts in quotes, comments, and what stands between blanks and commas
 WORD = re.compile(r"'(?:[^']|'')*'|![^\n]*|[^\s,='!/]+|[=/]")
@@ -64,6 +64,7 @@ class BenchFile:
 def read_bench_file(path: Path) -> BenchFile:
     """Read the group &bench of a namelist file."""
     try:
+        insist_on_file(Path(path))
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise cannot_read(path, error) from error

@@ -9,7 +9,7 @@ import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from polydem_post.base.result_file import ResultError
+from polydem_post.base.result_file import ResultError, insist_on_file
 
 from ..bench.paper import SIZES
 from .bench_file import RECORDED, BenchFile, number_of, read_bench_file
@@ -100,6 +100,7 @@ def make_plan(mode: str, folder: Path, cores: int, file: Path | None = None) -> 
 def plan_of_file(file: Path, folder: Path) -> list[Piece]:
     """The pieces of a JSON file: benches by the paths of their namelists from the file on, and options of others."""
     try:
+        insist_on_file(file)
         listed = json.loads(file.read_text(encoding="utf-8"))
         pieces = []
         for name, what in listed.items():

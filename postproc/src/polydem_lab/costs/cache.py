@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
-from polydem_post.base.result_file import UNREADABLE, ResultError, insist_on_own_data
+from polydem_post.base.result_file import UNREADABLE, ResultError, insist_on_own_data, open_hdf5
 
 from ..bench.records import read_records as read_all
 from ..bench.records import write_records
@@ -144,7 +143,7 @@ def _hardware(few: list, more: list, part: float) -> str:
 def _extent(trace: Path) -> tuple:
     """Steps and boxes of a trace."""
     try:
-        with h5py.File(trace, "r") as file:
+        with open_hdf5(trace) as file:
             insist_on_own_data(trace, file)
             steps, boxes, _ = file["aabb"].shape
             if boxes < 1:

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import h5py
 import numpy as np
-from polydem_post.base.result_file import UNREADABLE
+from polydem_post.base.result_file import UNREADABLE, open_hdf5
 
 from ..bench.samples import Case
 
@@ -66,7 +65,7 @@ def count_exchanges(trace: Path, steps: tuple[int, ...], most_parts: int) -> Exc
     """Count the exchanges of some steps of a trace, each from the step before it, for 1 to so many parts."""
     totals: list[int] = []
     most: dict[int, list] = {parts: [] for parts in range(1, most_parts + 1)}
-    with h5py.File(trace, "r") as file:
+    with open_hdf5(trace) as file:
         for step in steps:
             summed = exchanges_up_to(file["aabb"][step - 1], file["aabb"][step])
             totals.append(int(summed[-1]))
@@ -106,7 +105,7 @@ def way_of(case: Case) -> float:
 @cache
 def way_in(trace: Path) -> float:
     """Mean displacement of the centres of free boxes from step to step over the mean side of these boxes."""
-    with h5py.File(trace, "r") as file:
+    with open_hdf5(trace) as file:
         steps = len(file["aabb"])
         free = np.ones(file["aabb"].shape[1], dtype=bool)
         if "is_wall" in file:

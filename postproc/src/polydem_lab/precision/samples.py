@@ -20,7 +20,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from polydem_post.base.result_file import ResultError, cannot_read
+from polydem_post.base.result_file import ResultError, cannot_read, insist_on_file
 from polydem_post.read.trajectory import Trajectory
 
 from .scenes import INPUTS, SCENES, Model, Scene, last_frame
@@ -110,6 +110,7 @@ def read_samples(folder: Path) -> list[Sample]:
     if not path.exists():
         raise ResultError(f"{path}: there is no such file; ./polydem workprecision makes it")
     try:
+        insist_on_file(path)
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise cannot_read(path, error) from error

@@ -141,60 +141,75 @@ def decompose(outline: FloatArray) -> list[FloatArray]:
     convex (Hertel & Mehlhorn, LNCS 158 (1983) 207): at most four times as many pieces as needed.
     """
     insist_on_simple(outline)
-    pieces = _triangles(outline)
-    merged = True
-    while merged:
-        merged = False
-        for a in range(len(pieces)):
-            for b in range(a + 1, len(pieces)):
-                joined = _joined(outline, pieces[a], pieces[b])
-                if joined is not None:
-                    pieces[a] = joined
-                    del pieces[b]
-                    merged = True
-                    break
-            if merged:
+    return [tidy(outline[piece]) for piece in _merged(outline, _triangles(outline))]
+
+
+def _merged(outline: FloatArray, triangles: list[list[int]]) -> list[list[int]]:
+    """Convex pieces of triangles. A diagonal that must stay between two pieces must stay when they have grown, too."""
+    pieces = dict(enumerate(triangles))
+    # Piece of each edge: of those between two pieces only while they may become one
+    owner = {edge: number for number, piece in pieces.items() for edge in _edges(piece)}
+    for here in range(len(triangles)):
+        while here in pieces:
+            beside = [(owner[end, begin], (begin, end)) for begin, end in _edges(pieces[here])
+                      if owner.get((end, begin), -1) > here]
+            if not beside:
                 break
-    return [tidy(outline[piece]) for piece in pieces]
+            other, (begin, end) = min(beside)
+            del owner[begin, end], owner[end, begin]
+            joined = _joined(pieces[here], pieces[other], begin, end)
+            if _is_convex(outline[joined]):
+                owner.update((edge, here) for edge in _edges(pieces.pop(other)) if edge in owner)
+                pieces[here] = joined
+    return list(pieces.values())
+
+
+def _joined(one: list[int], other: list[int], begin: int, end: int) -> list[int]:
+    """Two pieces as one, without their common edge, which begins and ends at vertices of the first piece."""
+    k, m = one.index(end), other.index(begin)
+    return [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
+
+
+def _edges(piece: list[int]) -> list[tuple[int, int]]:
+    return list(zip(piece, [*piece[1:], piece[0]]))
 
 
 def _triangles(outline: FloatArray) -> list[list[int]]:
-    left, found = list(range(len(outline))), []
+    """Triangles of an outline: the ears with the greatest least angle are cut off first."""
+    n, found = len(outline), []
     size = float(np.abs(outline - outline.mean(axis=0)).max())
+    left = np.arange(n)
+    quality, blocker = np.full(n, -np.inf), np.full(n, -1)
+    stale = list(range(n))
     while len(left) > 3:
-        ears = []
-        for k in range(len(left)):
-            corner = left[k - 1], left[k], left[(k + 1) % len(left)]
-            a, b, c = outline[list(corner)]
-            if _cross(a, b, c) > ROUNDOFF * size**2 and not any(
-                    _inside(outline[other], a, b, c) for other in left if other not in corner):
-                ears.append((_least_angle(a, b, c), k, corner))
-        if not ears:
+        for vertex in stale:
+            k = int(np.searchsorted(left, vertex))
+            corner = [int(left[k - 1]), vertex, int(left[(k + 1) % len(left)])]
+            a, b, c = outline[corner]
+            quality[vertex], blocker[vertex] = -np.inf, -1
+            if _cross(a, b, c) > ROUNDOFF * size**2:
+                others = left[~np.isin(left, corner)]
+                inside = others[_inside(outline[others], a, b, c)]
+                blocker[vertex] = inside[0] if len(inside) else -1
+                quality[vertex] = -np.inf if len(inside) else _least_angle(a, b, c)
+        # Of equal ears the last one
+        vertex = n - 1 - int(np.argmax(quality[::-1]))
+        if quality[vertex] == -np.inf:
             raise OutlineError("it cannot be decomposed: its edges touch")
-        _, k, corner = max(ears)
-        found.append(list(corner))
-        del left[k]
+        k = int(np.searchsorted(left, vertex))
+        neighbours = [int(left[k - 1]), int(left[(k + 1) % len(left)])]
+        found.append([neighbours[0], vertex, neighbours[1]])
+        left = np.delete(left, k)
+        quality[vertex], blocker[vertex] = -np.inf, -1
+        stale = sorted({*neighbours, *np.flatnonzero(blocker == vertex).tolist()})
         left = _without_straight(outline, left, size)
-    return [*found, left] if len(left) == 3 else found
+    return [*found, left.tolist()] if len(left) == 3 else found
 
 
-def _without_straight(outline: FloatArray, left: list[int], size: float) -> list[int]:
+def _without_straight(outline: FloatArray, left: Any, size: float) -> Any:
     """The rest of an outline, as long as it has an area."""
     area = abs(area_of(outline[left]))
-    return left if area > ROUNDOFF * size**2 else []
-
-
-def _joined(outline: FloatArray, one: list[int], other: list[int]) -> list[int] | None:
-    """Two pieces with a common edge as one, if that is convex."""
-    for k in range(len(one)):
-        edge = one[k], one[(k + 1) % len(one)]
-        for m in range(len(other)):
-            if (other[(m + 1) % len(other)], other[m]) == edge:
-                whole = one[k + 1 :] + one[: k + 1] if k + 1 < len(one) else one[:]
-                rest = [other[(m + 1 + step) % len(other)] for step in range(1, len(other) - 1)]
-                whole = whole + rest
-                return whole if _is_convex(outline[whole]) else None
-    return None
+    return left if area > ROUNDOFF * size**2 else left[:0]
 
 
 def _turn(arriving: FloatArray, leaving: FloatArray) -> float:
@@ -207,8 +222,10 @@ def _cross(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
     return _turn(b - a, c - b)
 
 
-def _inside(point: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
-    return min(_cross(a, b, point), _cross(b, c, point), _cross(c, a, point)) >= 0.0
+def _inside(points: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> Any:
+    """Whether points, (point, 2), are in a triangle."""
+    sides = (_turns((q - p)[None, :], points - q) for p, q in ((a, b), (b, c), (c, a)))
+    return np.minimum.reduce(list(sides)) >= 0.0
 
 
 def _least_angle(a: FloatArray, b: FloatArray, c: FloatArray) -> float:

@@ -231,7 +231,7 @@ def _identity(path: Path) -> tuple[int, ...] | None:
 def insist_on_file(path: Path) -> None:
     """Refuse a pipe or a device: whoever opens a pipe without a writer waits for ever."""
     if path.exists() and not path.is_file() and not path.is_dir():
-        raise OSError(errno.EEXIST, "it is a pipe or a device, no file")
+        raise OSError(errno.EEXIST, "it is a pipe or a device; write what it gives to a file first")
 
 
 def open_hdf5(path: Path) -> h5py.File:

@@ -105,6 +105,7 @@ def check_bytes(folder: Path, name: str, manifest: Manifest) -> None:
 
 def file_checksum(path: Path) -> str:
     """CRC-32 of all bytes of a file, eight hexadecimal digits."""
+    insist_on_file(path)
     checksum = 0
     with path.open("rb") as file:
         while block := file.read(_BLOCK):

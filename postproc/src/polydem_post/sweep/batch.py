@@ -167,6 +167,7 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     """Number and words of each line that is not blank."""
     lines = []
     try:
+        insist_on_file(Path(path))
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file, strict=True)
             number = 1

@@ -116,7 +116,7 @@ def reads_bodies(result: Path) -> bool:
 def last_words(run: Run) -> str:
     """The last line that a run printed."""
     path = run.folder / OUTPUT
-    if not path.exists():
+    if not path.is_file():
         return ""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - 4096))
