@@ -28,21 +28,28 @@ class Additions:
             if body.material:
                 scene.acts.setdefault(body.id, set()).add("materials")
 
-    def a_wall(self):
-        """A wall that may get a motion or a load: the floor before others, and one that has another motion if need be."""
+    def a_wall(self, shifts=False):
+        """A wall that may get a motion or a load: the floor before others, and one that has another motion if need be.
+
+        One that yields along one axis may be shifted along the other.
+        """
         taken = {group.get("wall") for group in self.scene.groups.values()}
         names = [name for name in self.floors if name not in taken]
-        again = taken and not self.scene.named("load") and (not names or self.dice.random() < 0.5)
+        free = not self.scene.named("load") or (
+            shifts and self.floors and "load_hinged" not in self.chosen and self.direction(self.floors[0]))
+        again = taken and free and (not names or self.dice.random() < 0.5)
         return self.floors[0] if again and self.floors else names[0] if names else None
 
     def direction(self, wall):
-        """Unit vectors along which a wall may move: not along a periodic axis, if it spans the cell."""
+        """Unit vectors along which a wall may move: not along a periodic axis, if it spans the cell, nor along a load."""
         bodies = self.scene.groups[f"wall.{wall}"]["bodies"]
-        axes = [axis for axis in (0, 1) if axis not in self.scene.periodic or len(bodies) > 1]
+        loads = [group for name, group in self.scene.groups.items() if name.startswith("load.") and group["wall"] == wall]
+        axes = [axis for axis in (0, 1) if (axis not in self.scene.periodic or len(bodies) > 1)
+                and all(load["direction"] != "xy"[axis] for load in loads)]
         return [np.eye(2)[axis] for axis in axes]
 
     def motion(self, tag, **entries):
-        wall = self.a_wall()
+        wall = self.a_wall(shifts="pivot" not in entries and "file" not in entries)
         if wall is None:
             self.drop(tag)
             return None
