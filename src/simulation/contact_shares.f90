@@ -28,7 +28,7 @@ module polydem_contact_shares
       integer(ip) :: n = 0_ip
       !> Their indices in the pair list, ascending
       integer(ip), allocatable :: pair(:)
-      !> Damping force of each over 2 zeta sqrt(E), and its dashpot likewise; 0 for a contact alone
+      !> Damping force of each over 2 zeta, and its dashpot likewise; 0 for a contact alone
       real(wp), allocatable :: force(:), dashpot(:)
       !> Group of each: the slot of its free body, or for two free bodies a number above all slots
       integer(ip), allocatable, private :: group(:)
@@ -252,9 +252,9 @@ contains
       real(wp), intent(in) :: stiffness
       type(spring_t) :: spring
 
-      spring%stiffness = reach*block%inverse_length(c)
+      spring%stiffness = stiffness*reach*block%inverse_length(c)
       spring%rate = block%rate(c)/reach
-      spring%elastic = block%elastic(c)/stiffness
+      spring%elastic = block%elastic(c)
       if (bodies%fixed(block%first(c))) then
          spring%row = [-block%normal(c, :), -block%moment(c, 2)]/reach
          spring%mobility = mobility_of(bodies, block%second(c), [0.0_wp, 0.0_wp])

@@ -59,8 +59,8 @@ module polydem_contact_block
       !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
       real(wp) :: normal_force(block_size)
       !> Of one of several contacts between the same two bodies, where fixed bodies count as one: its normal damping
-      !> force [sqrt(N) m/s] and its dashpot [sqrt(N)] over 2 zeta sqrt(E); 0 for a contact alone. Set only if the force
-      !> law needs shares
+      !> force [N/m] and its dashpot [N s/m2], both over 2 zeta; 0 for a contact alone. Set only if the force law needs
+      !> shares
       real(wp) :: shared_force(block_size), shared_dashpot(block_size)
       !> Normal damping force per normal velocity, before its limit; set only if tilts are damped [N s/m2]
       real(wp) :: dashpot(block_size)

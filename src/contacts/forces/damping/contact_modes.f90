@@ -31,11 +31,11 @@ module polydem_contact_modes
 
    !> One of several contacts between two bodies
    type :: spring_t
-      !> Stiffness over E; 0: there is no contact
+      !> Stiffness k [N/m2]; 0: there is no contact
       real(wp) :: stiffness = 0.0_wp
       !> Rate at which the contact closes [m/s]
       real(wp) :: rate = 0.0_wp
-      !> Elastic force over E [m]
+      !> Elastic force [N/m]
       real(wp) :: elastic = 0.0_wp
       !> Rate J per velocities along x and y [1] and angular velocity [m] of the first body relative to the second
       real(wp) :: row(3) = 0.0_wp
@@ -92,13 +92,14 @@ contains
       real(wp) :: root(3, 3), axes(3, 3), square(3), outer(3, 3), share, force
       integer :: k
 
-      call find_root(mobility, root)
+      ! Roots are of numbers whose units are squares, so that other units, times powers of two, change no bit.
+      call find_root(mobility/mobility(1, 1), root)
       call diagonalise(matmul(transpose(root), matmul(sums%stiffness, root)), square, axes)
       do k = 1, 3
          share = square(k)/maxval(square)
          if (share <= epsilon(share)) cycle
          outer = (1.0_wp + half_weight)*share**2/(share**2 + half_weight)*outer_square(matmul(root, axes(:, k)))
-         modes%mobility = modes%mobility + outer/sqrt(square(k))
+         modes%mobility = modes%mobility + outer*mobility(1, 1)/sqrt(mobility(1, 1)*square(k))
          modes%compliance = modes%compliance + outer/square(k)
       end do
       modes%motion = matmul(modes%compliance, sums%impulse)
@@ -108,14 +109,14 @@ contains
          dot_product(sums%elastic, matmul(modes%compliance, sums%elastic))/sums%squares))
    end subroutine find_modes
 
-   !> Find the damping of one contact: its force and its dashpot, both over 2 zeta sqrt(E).
+   !> Find the damping of one contact: its force and its dashpot, both over 2 zeta.
    pure subroutine find_damping(spring, modes, force, dashpot)
       type(spring_t), intent(in) :: spring
       !> Modes of its two bodies
       type(modes_t), intent(in) :: modes
-      !> The force [sqrt(N) m/s]
+      !> The force [N/m]
       real(wp), intent(out) :: force
-      !> The dashpot [sqrt(N)]
+      !> The dashpot [N s/m2]
       real(wp), intent(out) :: dashpot
       real(wp) :: rigid
 

@@ -75,19 +75,21 @@ contains
       end associate
       call find_reaches(block, reach)
       call find_mobilities(block, reach, mobility)
-      factor = 2.0_wp*self%coefficient%one*sqrt(self%stiffness)
+      factor = 2.0_wp*self%coefficient%one
       if (self%friction_column > 0) &
-         call include_friction(factor, block, reach, history%column(self%friction_column)%value, mobility)
+         call include_friction(self%stiffness, factor, block, reach, history%column(self%friction_column)%value, &
+                               mobility)
       do c = 1_ip, block%n
          force(c) = factor*merge(block%shared_force(c), &
-            sqrt(block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c), block%shared_dashpot(c) > 0.0_wp)
+            sqrt(self%stiffness*block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c), &
+            block%shared_dashpot(c) > 0.0_wp)
       end do
       call self%coefficient%scale(block%n, block%material, force)
       call self%add_limited(force, block)
       if (.not. self%fills_dashpots) return
       do c = 1_ip, block%n
          block%dashpot(c) = factor*(block%length(c)/reach(c))*merge(block%shared_dashpot(c), &
-            sqrt(reach(c)*block%inverse_length(c)/mobility(c)), block%shared_dashpot(c) > 0.0_wp)
+            sqrt(self%stiffness*reach(c)*block%inverse_length(c)/mobility(c)), block%shared_dashpot(c) > 0.0_wp)
       end do
       call self%coefficient%scale(block%n, block%material, block%dashpot)
    end subroutine add
@@ -112,9 +114,9 @@ contains
 
    !> Add to the mobilities what friction does to the approach: its force of the last step over the present normal
    !> force, times the mobility between the directions of both.
-   pure subroutine include_friction(factor, block, reach, friction, mobility)
-      !> 2 zeta sqrt(E)
-      real(wp), intent(in) :: factor
+   pure subroutine include_friction(stiffness, factor, block, reach, friction, mobility)
+      !> Stiffness E of the law [N/m2], and 2 zeta
+      real(wp), intent(in) :: stiffness, factor
       type(contact_block_t), intent(in) :: block
       real(wp), intent(in) :: reach(block_size)
       !> Force of friction on the first body at the last step, (pair) [N/m]
@@ -128,8 +130,8 @@ contains
          second = block%direction(c, 1)*block%arm_second(c, 1) + block%direction(c, 2)*block%arm_second(c, 2)
          cross = (block%moment(c, 1)*first*block%inverse_inertia(c, 1) &
                   + block%moment(c, 2)*second*block%inverse_inertia(c, 2))/reach(c)
-         load = block%elastic(c) + max(-block%elastic(c), &
-                                       factor*sqrt(block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c))
+         load = block%elastic(c) + max(-block%elastic(c), factor* &
+            sqrt(stiffness*block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c))
          cross = friction(block%pair(c))*cross/max(load, tiny(load))
          mobility(c) = max(0.5_wp*mobility(c), min(2.0_wp*mobility(c), mobility(c) - cross))
       end do
