@@ -104,8 +104,8 @@ contains
       end associate
    end subroutine stretch_bodies
 
-   !> Let some free bodies keep their velocity relative to a shear that changes in this step. Several threads may call it
-   !> for different bodies.
+   !> Let some free bodies keep their velocity relative to a shear that changes in this step. Several threads may call
+   !> it for different bodies.
    pure subroutine follow_shear(bodies, slots)
       !> Bodies in the cell at the start of a step; `position` and `velocity` change along x
       type(bodies_t), intent(inout) :: bodies

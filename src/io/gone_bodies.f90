@@ -1,5 +1,5 @@
-!> Bodies of a checkpoint that belong to walls that have vanished. A run that starts from the checkpoint is without them:
-!> its bodies are numbered without gaps, and have other rows in the file.
+!> Bodies of a checkpoint that belong to walls that have vanished. A run that starts from it is without them: its bodies
+!> are numbered without gaps, and have other rows in the file.
 module polydem_gone_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t

@@ -41,9 +41,10 @@ class Additions:
         return self.floors[0] if again and self.floors else names[0] if names else None
 
     def direction(self, wall):
-        """Unit vectors along which a wall may move: not along a periodic axis, if it spans the cell, nor along a load."""
+        """Unit vectors along which a wall may move: not along its load, nor a periodic axis that it spans."""
         bodies = self.scene.groups[f"wall.{wall}"]["bodies"]
-        loads = [group for name, group in self.scene.groups.items() if name.startswith("load.") and group["wall"] == wall]
+        loads = [group for name, group in self.scene.groups.items()
+                 if name.startswith("load.") and group["wall"] == wall]
         axes = [axis for axis in (0, 1) if (axis not in self.scene.periodic or len(bodies) > 1)
                 and all(load["direction"] != "xy"[axis] for load in loads)]
         return [np.eye(2)[axis] for axis in axes]
@@ -207,7 +208,7 @@ class Additions:
         self.scene.put("sample", area="rectangle", **self.rectangle())
 
     def add_source(self):
-        """A square enters beside the first grain, where there is room for one at a place that leaves nothing to chance."""
+        """A square enters beside the first grain, where there is room for one at a place without chance."""
         scene, half = self.scene, 0.4*self.radius
         place, velocity = self.low + np.array([1.5, 0.5])*self.pitch, np.array([-5.0, self.uniform(-1, 1)])
         if self.container not in WITHOUT_WALLS:

@@ -20,7 +20,8 @@ STARTS = {"start_checkpoint", "start_frame"}
 #: Of what one scene has one or two
 ALTERNATIVES = [(STARTS, 1), (DRIVEN, 2), (set(CONTAINERS), 1), *((set(kind), 1) for kind in KINDS)]
 #: Share of the scenes with a capability in which it acts on a touching body; of others nearly all
-SELDOM = {"source": 0.6, "sink": 0.7, "gate": 0.7, "sheared": 0.8, "periodic_x": 0.7, "periodic_y": 0.7, "periodic_xy": 0.8,
+SELDOM = {"source": 0.6, "sink": 0.7, "gate": 0.7, "sheared": 0.8,
+          "periodic_x": 0.7, "periodic_y": 0.7, "periodic_xy": 0.8,
           **dict.fromkeys(DRIVEN, 0.8), "load": 0.6, "motion_table": 0.6}
 #: All capabilities, of which each pair that is possible acts on touching bodies
 CAPABILITIES = (*CONTAINERS, *EXTRAS, "walls", *(name for kind in KINDS[::-1] for name in kind))

@@ -143,8 +143,8 @@ contains
       call table%expect_least('its fall when dt is halved, sheared', 1.8_wp, missing(1)/missing(2))
    end subroutine close_energy
 
-   !> The same grains in a cell whose border is elsewhere. Velocities are compared relative to the shear, which are those
-   !> of all copies.
+   !> The same grains in a cell whose border is elsewhere. Velocities are compared relative to the shear, which are
+   !> those of all copies.
    subroutine move_border(table, name, cell)
       type(table_t), intent(inout) :: table
       !> Name of the case, and entries of &cell
