@@ -90,7 +90,7 @@ def copies(scene, numbers):
     other.put("cell", size=list(size*numbers))
     if not scale_cell(other, numbers):
         return None
-    jump = rate*size[1]
+    jump = 0.0 if "shear_ramp" in scene.tags else rate*size[1]
     drift = np.array([-0.5*(numbers[1] - 1)*jump, 0.0])
     offsets = [np.array([i, j]) for j in range(numbers[1]) for i in range(numbers[0])]
     ids = copy_bodies(scene, other, offsets, jump, drift)
