@@ -21,7 +21,7 @@ module polydem_clipping
    use polydem_overlap_tolerances, only: far, roundoff, separable_area
    implicit none
    private
-   public :: clip_overlap
+   public :: clip_overlap, clip_loop, usual_corners
 
    !> Capacity of the work arrays of fixed size, in vertices of both polygons together
    integer(ip), parameter :: usual_corners = 48_ip
@@ -193,7 +193,50 @@ contains
       !> Depths times the length of the edge: of each vertex below the clip line, and of the centre below each line
       real(wp), intent(inout) :: work(corners, 2)
       type(overlap_t), intent(inout) :: overlap
-      integer(ip) :: i, k, m, n, now
+      integer(ip) :: n, now
+
+      call cut_all(subject, clipper, offset, scale, corners, vertex, on_clipper, work, n, now)
+      if (n == 0_ip) return
+      call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
+      if (.not. (by%has_moments .and. overlap%area > 0.0_wp)) return
+      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, by, vertex(:, :, 3_ip - now), &
+                          overlap)
+   end subroutine clip_in
+
+   !> The loop around the overlap of two polygons with at most `usual_corners` corners together; none for more.
+   pure subroutine clip_loop(subject, clipper, offset, scale, n, vertex, on_clipper)
+      !> Vertices, anticlockwise, each relative to its own centre, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
+      !> Centre of the clipper minus centre of the subject, and radius of the subject [m]
+      real(wp), intent(in) :: offset(2), scale
+      !> Number of vertices; 0: there is no overlap
+      integer(ip), intent(out) :: n
+      !> Vertices, anticlockwise, relative to the centre of the subject [m]
+      real(wp), intent(out) :: vertex(usual_corners, 2)
+      !> Whether the edge that starts at a vertex lies on the clipper's outline
+      logical, intent(out) :: on_clipper(usual_corners)
+      real(wp) :: loops(usual_corners, 2, 2), work(usual_corners, 2)
+      logical :: flags(usual_corners, 2)
+      integer(ip) :: now
+
+      n = 0_ip
+      if (size(subject, 2) + size(clipper, 2) > usual_corners) return
+      call cut_all(subject, clipper, offset, scale, usual_corners, loops, flags, work, n, now)
+      vertex(:n, :) = loops(:n, :, now)
+      on_clipper(:n) = flags(:n, now)
+   end subroutine clip_loop
+
+   !> Cut the subject along all edges of the clipper, in given work arrays as those of `clip_in`.
+   pure subroutine cut_all(subject, clipper, offset, scale, corners, vertex, on_clipper, work, n, now)
+      real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
+      real(wp), intent(in) :: offset(2), scale
+      integer(ip), intent(in) :: corners
+      real(wp), intent(inout) :: vertex(corners, 2, 2)
+      logical, intent(inout) :: on_clipper(corners, 2)
+      real(wp), intent(inout) :: work(corners, 2)
+      !> Number of vertices that are left, 0 if there is no overlap, and the loop that they are in
+      integer(ip), intent(out) :: n, now
+      integer(ip) :: i, k, m
       real(wp) :: edge(2), lowest, highest
 
       n = size(subject, 2, kind=ip)
@@ -210,7 +253,10 @@ contains
          ! An edge farther from the centre than the size of the subject cuts nothing: its length is sqrt(2) max at most.
          if (work(k, 2) <= 1.43_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
             call measure(n, corners, vertex(:, :, now), edge, work(k, 2), scale, work(:, 1), lowest, highest)
-            if (.not. highest > 0.0_wp) return
+            if (.not. highest > 0.0_wp) then
+               n = 0_ip
+               return
+            end if
             if (lowest < 0.0_wp) then
                call cut(n, corners, vertex(:, :, now), on_clipper(:, now), work(:, 1), &
                         vertex(:, :, 3_ip - now), on_clipper(:, 3_ip - now))
@@ -221,11 +267,7 @@ contains
          end if
          k = merge(1_ip, k + 1_ip, k == m)
       end do
-      call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
-      if (.not. (by%has_moments .and. overlap%area > 0.0_wp)) return
-      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, by, vertex(:, :, 3_ip - now), &
-                          overlap)
-   end subroutine clip_in
+   end subroutine cut_all
 
    !> Depth of the subject's centre below all edges of the clipper
    pure subroutine find_levels(clipper, offset, scale, level, lowest)

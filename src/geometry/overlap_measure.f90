@@ -31,10 +31,21 @@ module polydem_overlap_measure
       real(wp) :: share_effective = 0.0_wp
       !> Power s of the length by which B is divided, 0, 1/2 or 1
       real(wp) :: power = 0.0_wp
+   contains
+      procedure :: joins
    end type overlap_measure_t
 
    !> The true area, and the effective area
    type(overlap_measure_t), parameter :: true_area = overlap_measure_t()
    type(overlap_measure_t), parameter :: effective_area = overlap_measure_t(.true., 1.0_wp, 0.0_wp)
+
+contains
+
+   !> Whether overlaps with neighbouring pieces must count as one (`polydem_merged_overlaps`)
+   elemental logical function joins(self)
+      class(overlap_measure_t), intent(in) :: self
+
+      joins = self%power >= 1.0_wp .and. .not. self%share_effective > 0.0_wp
+   end function joins
 
 end module polydem_overlap_measure

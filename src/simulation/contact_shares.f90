@@ -15,6 +15,7 @@ module polydem_contact_shares
    use polydem_fill_block, only: fill_block
    use polydem_force_law, only: force_law_t
    use polydem_grow, only: grow
+   use polydem_joined_contacts, only: join_contacts, joined_contact_t, replace_overlap
    use polydem_kinds, only: ip, min_parallel_size, wp
    use polydem_normal_damping, only: find_reaches
    use polydem_pair_list, only: pair_list_t
@@ -34,6 +35,11 @@ module polydem_contact_shares
       integer(ip), allocatable, private :: group(:)
       !> The contact of each
       type(spring_t), allocatable, private :: spring(:)
+      !> Whether overlaps with neighbouring pieces count as one, and what replaces them
+      logical, private :: joins = .false.
+      type(joined_contact_t), allocatable, private :: joined(:)
+      !> Next contact of the same group in the list, 0 at its end
+      integer(ip), allocatable, private :: next(:)
       !> Greatest number of a group
       integer(ip), private :: n_groups = 0_ip
       !> Number of pairs of each group; 0 between two steps, (group)
@@ -61,18 +67,68 @@ contains
       !> Contact history of the pairs; it is not changed
       type(contact_history_t), intent(in) :: history
       type(contact_shares_t), intent(inout) :: shares
-      integer(ip) :: low
 
       call list_pairs(bodies, pairs, shares)
       if (shares%n == 0_ip) return
+      shares%joined(:shares%n)%is_joined = .false.
+      shares%joins = .false.
+      call find_all_springs(law, bodies, pairs, history, shares)
+      if (law%overlap_measure%joins()) call join_groups(bodies, pairs, shares)
+      if (shares%joins) call find_all_springs(law, bodies, pairs, history, shares)
+      call divide(shares)
+   end subroutine find_shares
+
+   !> Find the contacts of all listed pairs.
+   subroutine find_all_springs(law, bodies, pairs, history, shares)
+      type(force_law_t), intent(in) :: law
+      type(bodies_t), intent(in) :: bodies
+      type(pair_list_t), intent(in) :: pairs
+      type(contact_history_t), intent(in) :: history
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: low
+
       !$omp parallel do if (shares%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, bodies, pairs, history, shares) private(low)
       do low = 1_ip, shares%n, block_size
          call find_springs(law, bodies, pairs, history, low, min(shares%n, low + block_size - 1_ip), shares)
       end do
       !$omp end parallel do
-      call divide(shares)
-   end subroutine find_shares
+   end subroutine find_all_springs
+
+   !> Join the overlaps of each group with several contacts.
+   subroutine join_groups(bodies, pairs, shares)
+      type(bodies_t), intent(in) :: bodies
+      type(pair_list_t), intent(in) :: pairs
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: head, k, n
+      integer(ip), allocatable :: list(:)
+      type(joined_contact_t), allocatable :: new(:)
+
+      ! The contacts of each group become a chain in ascending order; `count_of` has its head.
+      do k = shares%n, 1_ip, -1_ip
+         shares%next(k) = 0_ip
+         if (.not. shares%spring(k)%stiffness > 0.0_wp) cycle
+         shares%next(k) = shares%count_of(shares%group(k))
+         shares%count_of(shares%group(k)) = k
+      end do
+      do k = 1_ip, shares%n
+         head = shares%count_of(shares%group(k))
+         shares%count_of(shares%group(k)) = 0_ip
+         if (head == 0_ip) cycle
+         list = [integer(ip) ::]
+         n = head
+         do while (n > 0_ip)
+            list = [list, n]
+            n = shares%next(n)
+         end do
+         if (size(list) < 2) cycle
+         allocate (new(size(list)))
+         call join_contacts(bodies, pairs%first(shares%pair(list)), pairs%second(shares%pair(list)), new)
+         shares%joined(list) = new
+         shares%joins = shares%joins .or. any(new%is_joined)
+         deallocate (new)
+      end do
+   end subroutine join_groups
 
    !> List the pairs of groups with several pairs.
    subroutine list_pairs(bodies, pairs, shares)
@@ -230,6 +286,11 @@ contains
          end if
          do while (next >= 1_ip)
             call fill_block(bodies, first(:n), second(:n), law%overlap_measure, 1_ip, next, tested, mine, block)
+            do c = 1_ip, block%n
+               associate (new => shares%joined(low + block%pair(c) - 1_ip))
+                  if (new%is_joined) call replace_overlap(new, c, block)
+               end associate
+            end do
             call law%apply_elastic(bodies, block, mine)
             call find_reaches(block, reach)
             do c = 1_ip, block%n
@@ -336,6 +397,7 @@ contains
             if (block%pair(c) == p) then
                block%shared_force(c) = shares%force(cursor)
                block%shared_dashpot(c) = shares%dashpot(cursor)
+               if (shares%joined(cursor)%is_joined) call replace_overlap(shares%joined(cursor), c, block)
             end if
          end associate
          cursor = cursor - 1_ip
@@ -382,8 +444,9 @@ contains
       room = max(2_ip*room, n)
       call grow(shares%pair, shares%n, room)
       call grow(shares%group, shares%n, room)
-      if (allocated(shares%force)) deallocate (shares%force, shares%dashpot, shares%spring, shares%mine)
-      allocate (shares%force(room), shares%dashpot(room), shares%spring(room))
+      if (allocated(shares%force)) deallocate (shares%force, shares%dashpot, shares%spring, shares%joined, &
+                                                shares%next, shares%mine)
+      allocate (shares%force(room), shares%dashpot(room), shares%spring(room), shares%joined(room), shares%next(room))
       allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
       do k = 1_ip, size(shares%mine, kind=ip)
          allocate (shares%mine(k)%features(block_size))

@@ -117,7 +117,10 @@ contains
       law%description = ''
       do k = 1, size(law%parts)
          associate (part => law%parts(k)%part)
-            if (part%stage == stage_elastic) law%overlap_measure = part%overlap_measure
+            if (part%stage == stage_elastic) then
+               law%overlap_measure = part%overlap_measure
+               law%needs_shares = law%needs_shares .or. part%overlap_measure%joins()
+            end if
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist
             law%needs_shares = law%needs_shares .or. part%needs_shares

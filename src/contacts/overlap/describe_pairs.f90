@@ -7,7 +7,7 @@ module polydem_describe_pairs
    use polydem_overlap_batch, only: overlap_batch_t
    implicit none
    private
-   public :: describe_pairs, offset_of_contact
+   public :: describe_pairs, offset_of, offset_of_contact
 
 contains
 

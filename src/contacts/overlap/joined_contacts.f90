@@ -1,0 +1,156 @@
+!> Contacts of one body with neighbouring pieces of another one that count as one overlap (`polydem_merged_overlaps`).
+!>
+!> Bodies that are fixed count as one; they move alike or not at all where they have a flush joint.
+module polydem_joined_contacts
+   use polydem_bodies, only: bodies_t
+   use polydem_clipping, only: clip_loop
+   use polydem_contact_block, only: contact_block_t, is_exchanged
+   use polydem_describe_pairs, only: offset_of
+   use polydem_kinds, only: ip, wp
+   use polydem_merged_overlaps, only: integrate_joined, join_loops, overlap_loop_t
+   implicit none
+   private
+   public :: joined_contact_t, join_contacts, replace_overlap
+
+   !> What replaces the overlap of one of several contacts between two bodies
+   type :: joined_contact_t
+      !> Whether the contact is joined with others
+      logical :: is_joined = .false.
+      !> Slot of the body whose outline is integrated over
+      integer(ip) :: body = 0_ip
+      !> Gradient of the measure along the motion of that body [m], and its moments about its own centre and that of the
+      !> other body [m2]
+      real(wp) :: normal(2) = 0.0_wp, moment(2) = 0.0_wp
+      !> Square of the length of the overlap, for the share of this contact [m2]
+      real(wp) :: length_square = 0.0_wp
+   end type joined_contact_t
+
+   !> Distance of points that count as one over the radius of the body
+   real(wp), parameter :: tolerance = 1.0e-10_wp
+
+contains
+
+   !> Join the contacts of one body with another one, or with all fixed ones.
+   pure subroutine join_contacts(bodies, first, second, contacts)
+      !> Bodies with turned polygons
+      type(bodies_t), intent(in) :: bodies
+      !> Lower and higher piece of each contact
+      integer(ip), intent(in) :: first(:), second(:)
+      !> The contacts; all is set
+      type(joined_contact_t), intent(inout) :: contacts(:)
+      type(overlap_loop_t) :: loops(size(first))
+      real(wp) :: from_other(2)
+      integer(ip) :: k
+
+      do k = 1_ip, size(first, kind=ip)
+         contacts(k) = joined_contact_t()
+         call find_loop(bodies, first(k), second(k), contacts(k)%body, loops(k))
+      end do
+      call join_loops(tolerance*bodies%radius(contacts(1)%body), loops)
+      do k = 1_ip, size(first, kind=ip)
+         if (loops(k)%n == 0_ip .or. count(loops%part_of == loops(k)%part_of .and. loops%n > 0_ip) < 2) cycle
+         associate (new => contacts(k))
+            new%is_joined = .true.
+            call integrate_joined(loops, k, new%normal, new%moment(1), new%length_square)
+            from_other = offset_of(bodies, other_of(bodies, first(k), second(k), new%body), new%body)
+            new%moment(2) = new%moment(1) + (from_other(1)*new%normal(2) - from_other(2)*new%normal(1))
+         end associate
+      end do
+   end subroutine join_contacts
+
+   !> The body of a pair of pieces that is not the given one
+   pure integer(ip) function other_of(bodies, first, second, body)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: first, second, body
+
+      other_of = bodies%pieces%body_of(first)
+      if (other_of == body) other_of = bodies%pieces%body_of(second)
+   end function other_of
+
+   !> Find the outline of the overlap of two pieces, relative to the centre of the free body, or of the first one of two.
+   pure subroutine find_loop(bodies, first, second, body, loop)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: first, second
+      !> Slot of this body
+      integer(ip), intent(out) :: body
+      type(overlap_loop_t), intent(out) :: loop
+      real(wp) :: offset(2), arm(2)
+      integer(ip) :: i, j, a, b, k
+      logical :: swapped
+
+      i = bodies%pieces%body_of(first)
+      j = bodies%pieces%body_of(second)
+      swapped = is_exchanged(bodies, min(i, j), max(i, j)) .neqv. i > j
+      if (bodies%fixed(i) .neqv. bodies%fixed(j)) swapped = bodies%fixed(i)
+      a = merge(second, first, swapped)
+      b = merge(first, second, swapped)
+      body = merge(j, i, swapped)
+      offset = offset_of(bodies, body, merge(i, j, swapped))
+      arm = 0.0_wp
+      if (bodies%pieces%most > 1_ip) then
+         arm = bodies%pieces%arm(:, a)
+         offset = offset + (bodies%pieces%arm(:, b) - arm)
+      end if
+      if (radius_of(bodies, b) < radius_of(bodies, a)) then
+         call clip_loop(outline_of(bodies, b), outline_of(bodies, a), -offset, radius_of(bodies, b), &
+                        loop%n, loop%vertex, loop%on_outline)
+         arm = arm + offset
+      else
+         call clip_loop(outline_of(bodies, a), outline_of(bodies, b), offset, radius_of(bodies, a), &
+                        loop%n, loop%vertex, loop%on_outline)
+         loop%on_outline(:loop%n) = .not. loop%on_outline(:loop%n)
+      end if
+      do k = 1_ip, loop%n
+         loop%vertex(k, :) = loop%vertex(k, :) + arm
+      end do
+   end subroutine find_loop
+
+   !> Turned vertices of a piece relative to its own centre [m]
+   pure function outline_of(bodies, piece) result(outline)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: piece
+      real(wp), allocatable :: outline(:, :)
+
+      if (bodies%pieces%most > 1_ip) then
+         outline = bodies%pieces%outline(:, bodies%pieces%start(piece):bodies%pieces%start(piece + 1_ip) - 1_ip)
+      else
+         outline = bodies%pieces%turned_polygon(piece)
+      end if
+   end function outline_of
+
+   !> Radius of a piece [m]
+   pure real(wp) function radius_of(bodies, piece)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: piece
+
+      if (bodies%pieces%most > 1_ip) then
+         radius_of = bodies%pieces%radius(piece)
+      else
+         radius_of = bodies%radius(piece)
+      end if
+   end function radius_of
+
+   !> Replace the overlap of a contact of a block.
+   pure subroutine replace_overlap(new, c, block)
+      !> Of a contact that is joined
+      type(joined_contact_t), intent(in) :: new
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+      !> The block with overlaps and motions; normal, moments, lengths, rate and direction change
+      type(contact_block_t), intent(inout) :: block
+
+      if (block%first(c) == new%body) then
+         block%normal(c, :) = new%normal
+         block%moment(c, :) = new%moment
+      else
+         block%normal(c, :) = -new%normal
+         block%moment(c, :) = -new%moment([2, 1])
+      end if
+      block%length(c) = sqrt(new%normal(1)**2 + new%normal(2)**2)
+      block%length_square(c) = new%length_square
+      block%rate(c) = dot_product(block%normal(c, :), block%velocity_first(c, :) - block%velocity_second(c, :)) &
+         + (block%moment(c, 1)*block%angular_velocity(c, 1) - block%moment(c, 2)*block%angular_velocity(c, 2))
+      block%direction(c, :) = -block%normal(c, :)/max(block%length(c), tiny(block%length(c)))
+   end subroutine replace_overlap
+
+end module polydem_joined_contacts
