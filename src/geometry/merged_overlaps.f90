@@ -1,17 +1,17 @@
 !> Overlaps of one body with neighbouring pieces of another as one overlap, for a measure that is not a sum over pieces.
 !>
-!> A law that divides by the length of the overlap (`polydem_overlap_measure`) is stiffer the more pieces a body has: each
-!> piece has a shorter overlap. Where two overlaps have a whole edge in common, and together are convex, a body is only
-!> cut there. Such overlaps count as one. With the sums A, A c and J of their areas, first moments and polar moments, the
-!> measure X = A/L, L^2 = 12 J/A, has the gradient of `polydem_overlap_measure`, with one weight for all,
+!> A law that divides by the length of the overlap (`polydem_overlap_measure`) is stiffer the more pieces a body has:
+!> each piece has a shorter overlap. Where two overlaps have a whole edge in common, and together are convex, a body is
+!> only cut there. Such overlaps count as one. With the sums A, A c and J of their areas, first moments and polar
+!> moments, the measure X = A/L, L^2 = 12 J/A, has the gradient of `polydem_overlap_measure`, with one weight for all,
 !>
 !>     p(x) = 3/2 - A |x - c|^2/(2 J),
 !>
 !> under the integrals over the outline of the body inside each piece. Common edges are no outline. What a cut does not
 !> make convex stays apart: the faces of a notch, two feet, a joint that is not flush.
 !>
-!> So cuts change no force, and a piece that begins to overlap begins with the area 0: the force is continuous as long as
-!> the parts of a cut end flush, or in a convex corner, where another body reaches.
+!> So cuts change no force, and a piece that begins to overlap begins with the area 0: the force is continuous as long
+!> as the parts of a cut end flush, or in a convex corner, where another body reaches.
 module polydem_merged_overlaps
    use polydem_clipping, only: usual_corners
    use polydem_kinds, only: ip, wp

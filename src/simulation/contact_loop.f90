@@ -129,8 +129,8 @@ contains
       tested = next + 1_ip
       high = last(2)
       cursor = 0_ip
-      if (self%law%needs_shares .and. self%loop%shares%n > 0_ip) &
-         cursor = count(self%loop%shares%pair(:self%loop%shares%n) <= ends(2), kind=ip)
+      if (self%law%needs_shares .and. self%loop%shares%groups%n > 0_ip) &
+         cursor = count(self%loop%shares%groups%pair(:self%loop%shares%groups%n) <= ends(2), kind=ip)
       do while (next > ends(1))
          call own_clock%begin_block()
          associate (pairs => self%search%neighbours%pairs)

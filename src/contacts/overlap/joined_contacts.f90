@@ -16,6 +16,8 @@ module polydem_joined_contacts
    type :: joined_contact_t
       !> Whether the contact is joined with others
       logical :: is_joined = .false.
+      !> First one of those that it is joined with: its number among the contacts of both bodies
+      integer(ip) :: first = 0_ip
       !> Slot of the body whose outline is integrated over
       integer(ip) :: body = 0_ip
       !> Gradient of the measure along the motion of that body [m], and its moments about its own centre and that of the
@@ -51,6 +53,7 @@ contains
          if (loops(k)%n == 0_ip .or. count(loops%part_of == loops(k)%part_of .and. loops%n > 0_ip) < 2) cycle
          associate (new => contacts(k))
             new%is_joined = .true.
+            new%first = loops(k)%part_of
             call integrate_joined(loops, k, new%normal, new%moment(1), new%length_square)
             from_other = offset_of(bodies, other_of(bodies, first(k), second(k), new%body), new%body)
             new%moment(2) = new%moment(1) + (from_other(1)*new%normal(2) - from_other(2)*new%normal(1))
@@ -67,7 +70,7 @@ contains
       if (other_of == body) other_of = bodies%pieces%body_of(second)
    end function other_of
 
-   !> Find the outline of the overlap of two pieces, relative to the centre of the free body, or of the first one of two.
+   !> Find the outline of the overlap of two pieces, relative to the centre of the free body, or of the first of two.
    pure subroutine find_loop(bodies, first, second, body, loop)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: first, second

@@ -27,7 +27,7 @@ module polydem_contact_modes
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: spring_t, spring_sums_t, modes_t, add_spring, find_modes, find_damping
+   public :: spring_t, spring_sums_t, modes_t, add_spring, joined_spring, find_modes, find_damping
 
    !> One of several contacts between two bodies
    type :: spring_t
@@ -49,8 +49,8 @@ module polydem_contact_modes
       integer(ip) :: n = 0_ip
       !> Stiffness K, g and Q
       real(wp) :: stiffness(3, 3) = 0.0_wp, impulse(3) = 0.0_wp, elastic(3) = 0.0_wp
-      !> Sum of the squares of elastic forces over stiffnesses
-      real(wp) :: squares = 0.0_wp
+      !> Sum of the squares of elastic forces over stiffnesses, and sum of the elastic forces times the rates
+      real(wp) :: squares = 0.0_wp, power = 0.0_wp
    end type spring_sums_t
 
    !> The modes of two bodies
@@ -80,7 +80,25 @@ contains
       sums%impulse = sums%impulse + spring%stiffness*spring%rate*spring%row
       sums%elastic = sums%elastic + spring%elastic*spring%row
       sums%squares = sums%squares + spring%elastic**2/spring%stiffness
+      sums%power = sums%power + spring%elastic*spring%rate
    end subroutine add_spring
+
+   !> Contacts that are one, with one energy: the spring of their force, whose stiffness is the square of the force over
+   !> twice the energy. It has no stiffness if the forces cancel.
+   pure function joined_spring(sums, mobility) result(spring)
+      !> Sums over these contacts
+      type(spring_sums_t), intent(in) :: sums
+      !> Mobility Y of the two bodies
+      real(wp), intent(in) :: mobility(3, 3)
+      type(spring_t) :: spring
+
+      spring%mobility = mobility
+      spring%elastic = sqrt(sums%elastic(1)**2 + sums%elastic(2)**2)
+      if (.not. spring%elastic > 0.0_wp) return
+      spring%stiffness = spring%elastic**2/sums%squares
+      spring%rate = sums%power/spring%elastic
+      spring%row = sums%elastic/spring%elastic
+   end function joined_spring
 
    !> Find the modes of two bodies.
    pure subroutine find_modes(mobility, sums, modes)
