@@ -36,6 +36,9 @@ module polydem_restitution_damping
       procedure :: stiffen
    end type restitution_damping_t
 
+   !> Least normal force over the elastic one that friction is compared with: rounding of friction is no friction when a
+   !> contact opens
+   real(wp), parameter :: least_load = 0.1_wp
    !> Above this restitution damping is weak
    real(wp), parameter :: weak_restitution = 0.75_wp
 
@@ -130,8 +133,8 @@ contains
          second = block%direction(c, 1)*block%arm_second(c, 1) + block%direction(c, 2)*block%arm_second(c, 2)
          cross = (block%moment(c, 1)*first*block%inverse_inertia(c, 1) &
                   + block%moment(c, 2)*second*block%inverse_inertia(c, 2))/reach(c)
-         load = block%elastic(c) + max(-block%elastic(c), factor* &
-            sqrt(stiffness*block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c))
+         load = max(least_load*block%elastic(c), block%elastic(c) + factor* &
+                    sqrt(stiffness*block%inverse_length(c)/(reach(c)*mobility(c)))*block%rate(c))
          cross = friction(block%pair(c))*cross/max(load, tiny(load))
          mobility(c) = max(0.5_wp*mobility(c), min(2.0_wp*mobility(c), mobility(c) - cross))
       end do
