@@ -30,6 +30,7 @@ contains
    !> List the pairs of groups with several pairs.
    subroutine list_groups(bodies, pairs, groups)
       type(bodies_t), intent(in) :: bodies
+      !> Pairs of the list of neighbours
       type(pair_list_t), intent(in) :: pairs
       type(contact_groups_t), intent(inout) :: groups
 

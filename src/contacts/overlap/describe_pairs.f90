@@ -95,6 +95,7 @@ contains
    !> Centre of the second body minus centre of the first; in a periodic cell the vector to the nearest copy [m]
    pure function offset_of(bodies, i, j) result(offset)
       type(bodies_t), intent(in) :: bodies
+      !> Slots of the first and of the second body
       integer(ip), intent(in) :: i, j
       real(wp) :: offset(2)
 
