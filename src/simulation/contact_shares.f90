@@ -247,7 +247,7 @@ contains
          associate (g => shares%groups%group(k), joined => shares%joined(k))
             if (.not. shares%spring(k)%stiffness > 0.0_wp .or. is_other_part(joined, k)) cycle
             if (shares%sums(g)%n > 1_ip .or. joined%is_joined) &
-               call find_damping(shares%spring(k), shares%modes(g), shares%force(k), shares%dashpot(k))
+               call find_damping(shares%spring(k), shares%sums(g), shares%modes(g), shares%force(k), shares%dashpot(k))
          end associate
       end do
       if (shares%joins) call divide_joined(shares)

@@ -85,10 +85,11 @@ def bound_of(scene, answer, disturbed):
                 continue
             row, twin = frames[frame.step]
             place, velocity = folded(scene, frame, twin.position - frame.position, twin.velocity - frame.velocity)
-            turn, spin = (scene.size*abs(a - b).max() for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
+            turn, spin = (scene.size*abs(a - b).max(initial=0.0) for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
             energy = max(abs(other.balance[key][row] - answer.balance[key][k]) for key in ENERGIES)/scale
             force = abs(twin.wall_force - frame.wall_force).max()
-            worst = np.maximum(worst, [max(abs(place).max(), turn), max(abs(velocity).max(), spin), energy, force])
+            worst = np.maximum(worst, [max(abs(place).max(initial=0.0), turn), max(abs(velocity).max(initial=0.0), spin),
+                                       energy, force])
         bound.place[frame.step] = MARGIN*worst[0] + FLOOR*bound.size
         bound.velocity[frame.step] = MARGIN*worst[1] + FLOOR*bound.speed
         bound.energy[frame.step] = (MARGIN*worst[2] + ENERGY_FLOOR)*scale
@@ -108,7 +109,8 @@ def rows_of(answer, key):
 def mean_bound(answer, disturbed, key):
     """Bound of a column of the series, by step."""
     own, others = rows_of(answer, key), [rows_of(other, key) for other in disturbed]
-    scale = np.nanmax(np.abs([*own.values(), 0.0]))
+    like = TENSORS if key in TENSORS else (key,)
+    scale = np.nanmax(np.abs([0.0, *(value for name in like for value in rows_of(answer, name).values())]))
     worst, bound = 0.0, {}
     for step, value in own.items():
         for other in others:
@@ -165,6 +167,8 @@ def frame_difference(scene, answer, case, frame, twin, bound):
     if len(rows) != len(guests)*case.copies:
         return f"{len(rows)} other bodies instead of {len(guests)*case.copies}: {sorted(rows)[:4]}"
     pairs += match(scene, case, frame, twin, guests, list(rows.values()))
+    if not pairs:
+        return ""
     one, two = (np.array(side, dtype=int) for side in zip(*pairs))
     place, velocity = deviations(scene, case, frame, twin, one, two)
     turn = twin.angle[two] - change.sense*frame.angle[one]

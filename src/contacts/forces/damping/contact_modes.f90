@@ -13,9 +13,9 @@
 !> force is 0 where nothing closes.
 !>
 !> K^+ = C S^+ C^T with S = C^T K C and Y = C C^T. Contacts whose normals are nearly parallel hardly hold the bodies
-!> sideways. A mode with the share q of the greatest eigenvalue of S has the weight (1 + h^2) q^2/(q^2 + h^2) with
-!> h = 3e-3 in K^+: it counts half if its frequency is a twentieth of the highest one. What rates are left beyond u,
-!> these and those of walls with different motions, are damped by each contact for itself.
+!> sideways, so S^+ = (1 + h^2) (S^2 + h^2 tr(S)^2)^(-1) S with h = 3e-3: a mode counts half if its frequency is a
+!> twentieth of the highest one. What rates are left beyond u, these and those of walls with different motions, are
+!> damped by each contact for itself, with the frequency of the motion Y J^T that its force causes.
 !>
 !> The frequency is that of the present stiffness, which changes with the depth. For one contact of the conservative
 !> law, damping by the present stiffness gives the restitution exactly. So it does for several, if k is the square of
@@ -53,19 +53,15 @@ module polydem_contact_modes
       real(wp) :: squares = 0.0_wp, power = 0.0_wp
    end type spring_sums_t
 
-   !> The modes of two bodies
+   !> The relative motion of two bodies
    type :: modes_t
-      !> K^+: motion over force, (3, 3)
-      real(wp) :: compliance(3, 3) = 0.0_wp
-      !> Mobility over frequency, C S^(-1/2) C^T, (3, 3)
-      real(wp) :: mobility(3, 3) = 0.0_wp
-      !> Relative motion u, of the springs; reciprocal frequency 1/w of this motion, 0 at rest
+      !> Motion u, of the springs; reciprocal frequency 1/w of this motion, 0 at rest
       real(wp) :: motion(3) = 0.0_wp, period = 0.0_wp
       !> The factor r
       real(wp) :: factor = 1.0_wp
    end type modes_t
 
-   !> Square of the share h of the greatest eigenvalue at which a mode has half its weight
+   !> Square of h, the share of the greatest eigenvalue at which a mode has half its weight
    real(wp), parameter :: half_weight = 9.0e-6_wp
 
 contains
@@ -100,47 +96,82 @@ contains
       spring%row = sums%elastic/spring%elastic
    end function joined_spring
 
-   !> Find the modes of two bodies.
+   !> Find the relative motion of two bodies.
    pure subroutine find_modes(mobility, sums, modes)
       !> Mobility Y of one of the contacts
       real(wp), intent(in) :: mobility(3, 3)
       !> Sums over at least one contact
       type(spring_sums_t), intent(in) :: sums
       type(modes_t), intent(out) :: modes
-      real(wp) :: root(3, 3), axes(3, 3), square(3), outer(3, 3), share, force
-      integer :: k
+      real(wp) :: root(3, 3), s(3, 3), b(3, 3), force
+      integer :: i, j
 
       ! Roots are of numbers whose units are squares, so that other units, times powers of two, change no bit.
       call find_root(mobility/mobility(1, 1), root)
-      call diagonalise(matmul(transpose(root), matmul(sums%stiffness, root)), square, axes)
-      do k = 1, 3
-         share = square(k)/maxval(square)
-         if (share <= epsilon(share)) cycle
-         outer = (1.0_wp + half_weight)*share**2/(share**2 + half_weight)*outer_square(matmul(root, axes(:, k)))
-         modes%mobility = modes%mobility + outer*mobility(1, 1)/sqrt(mobility(1, 1)*square(k))
-         modes%compliance = modes%compliance + outer/square(k)
+      do j = 1, 3
+         b(:, j) = times(sums%stiffness, root(:, j))
       end do
-      modes%motion = matmul(modes%compliance, sums%impulse)
-      force = dot_product(sums%impulse, matmul(mobility, sums%impulse))
-      if (force > 0.0_wp) modes%period = sqrt(dot_product(sums%impulse, modes%motion)/force)
-      if (sums%squares > 0.0_wp) modes%factor = sqrt(min(1.0_wp, &
-         dot_product(sums%elastic, matmul(modes%compliance, sums%elastic))/sums%squares))
+      do j = 1, 3
+         do i = 1, 3
+            s(i, j) = dot(root(:, i), b(:, j))
+         end do
+      end do
+      do j = 1, 3
+         b(:, j) = times(s, s(:, j))
+      end do
+      force = half_weight*((s(1, 1) + s(2, 2)) + s(3, 3))**2
+      do j = 1, 3
+         b(j, j) = b(j, j) + force
+      end do
+      modes%motion = springs_give(sums%impulse)
+      force = form(sums%impulse, mobility, sums%impulse)
+      if (force > 0.0_wp) modes%period = sqrt(max(0.0_wp, dot(sums%impulse, modes%motion))/force)
+      if (sums%squares > 0.0_wp) modes%factor = &
+         sqrt(max(0.0_wp, min(1.0_wp, dot(sums%elastic, springs_give(sums%elastic))/sums%squares)))
+
+   contains
+
+      !> K^+ times a force
+      pure function springs_give(along) result(motion)
+         real(wp), intent(in) :: along(3)
+         real(wp) :: motion(3), x(3)
+
+         x = [dot(root(:, 1), along), dot(root(:, 2), along), dot(root(:, 3), along)]
+         x = (1.0_wp + half_weight)*solution(b, times(s, x))
+         motion = times(root, x)
+      end function springs_give
+
    end subroutine find_modes
 
+   !> Solution of a system of equations with a symmetric, positive definite matrix, by its cofactors
+   pure function solution(a, b) result(x)
+      real(wp), intent(in) :: a(3, 3), b(3)
+      real(wp) :: x(3), cofactor(3, 3)
+
+      cofactor(:, 1) = [a(2, 2)*a(3, 3) - a(2, 3)*a(2, 3), a(1, 3)*a(2, 3) - a(1, 2)*a(3, 3), &
+                        a(1, 2)*a(2, 3) - a(1, 3)*a(2, 2)]
+      cofactor(:, 2) = [cofactor(2, 1), a(1, 1)*a(3, 3) - a(1, 3)*a(1, 3), a(1, 2)*a(1, 3) - a(1, 1)*a(2, 3)]
+      cofactor(:, 3) = [cofactor(3, 1), cofactor(3, 2), a(1, 1)*a(2, 2) - a(1, 2)*a(1, 2)]
+      x = times(cofactor, b)/dot(a(:, 1), cofactor(:, 1))
+   end function solution
+
    !> Find the damping of one contact: its force and its dashpot, both over 2 zeta.
-   pure subroutine find_damping(spring, modes, force, dashpot)
+   pure subroutine find_damping(spring, sums, modes, force, dashpot)
       type(spring_t), intent(in) :: spring
-      !> Modes of its two bodies
+      !> Sums and motion of its two bodies
+      type(spring_sums_t), intent(in) :: sums
       type(modes_t), intent(in) :: modes
       !> The force [N/m]
       real(wp), intent(out) :: force
       !> The dashpot [N s/m2]
       real(wp), intent(out) :: dashpot
-      real(wp) :: rigid
+      real(wp) :: rigid, u(3), g(3)
 
       associate (row => spring%row, k => modes%factor*spring%stiffness)
-         rigid = dot_product(row, modes%motion)
-         dashpot = k*dot_product(row, matmul(modes%mobility, row))/dot_product(row, matmul(spring%mobility, row))
+         u = times(spring%mobility, row)
+         g = times(sums%stiffness, u)
+         rigid = dot(row, modes%motion)
+         dashpot = k*sqrt(dot(g, u)/form(g, spring%mobility, g))
          force = k*modes%period*rigid + dashpot*(spring%rate - rigid)
       end associate
    end subroutine find_damping
@@ -149,9 +180,36 @@ contains
    pure function outer_square(a) result(matrix)
       real(wp), intent(in) :: a(3)
       real(wp) :: matrix(3, 3)
+      integer :: j
 
-      matrix = spread(a, 2, 3)*spread(a, 1, 3)
+      do j = 1, 3
+         matrix(1, j) = a(1)*a(j)
+         matrix(2, j) = a(2)*a(j)
+         matrix(3, j) = a(3)*a(j)
+      end do
    end function outer_square
+
+   !> A matrix times a vector; the intrinsic function takes longer
+   pure function times(matrix, a) result(b)
+      real(wp), intent(in) :: matrix(3, 3), a(3)
+      real(wp) :: b(3)
+
+      b = (matrix(:, 1)*a(1) + matrix(:, 2)*a(2)) + matrix(:, 3)*a(3)
+   end function times
+
+   !> The product a^T b
+   pure real(wp) function dot(a, b)
+      real(wp), intent(in) :: a(3), b(3)
+
+      dot = (a(1)*b(1) + a(2)*b(2)) + a(3)*b(3)
+   end function dot
+
+   !> The form a^T M b
+   pure real(wp) function form(a, matrix, b)
+      real(wp), intent(in) :: a(3), matrix(3, 3), b(3)
+
+      form = dot(a, times(matrix, b))
+   end function form
 
    !> Find the lower triangular root C of a positive definite matrix C C^T.
    pure subroutine find_root(matrix, root)
@@ -167,47 +225,5 @@ contains
          end do
       end do
    end subroutine find_root
-
-   !> Find eigenvalues and eigenvectors of a symmetric matrix by Jacobi's rotations (Golub & Van Loan, Matrix
-   !> Computations, 4th ed., Sec. 8.5).
-   pure subroutine diagonalise(matrix, values, vectors)
-      real(wp), intent(in) :: matrix(3, 3)
-      !> Eigenvalues, and eigenvectors as columns
-      real(wp), intent(out) :: values(3), vectors(3, 3)
-      real(wp) :: a(3, 3), turn(3, 3), c, s, t, theta
-      integer, parameter :: rows(3) = [1, 1, 2], columns(3) = [2, 3, 3]
-      integer :: i, k, n, p, q
-
-      a = matrix
-      vectors = 0.0_wp
-      do k = 1, 3
-         vectors(k, k) = 1.0_wp
-      end do
-      sweeps: do n = 1, 8
-         if (.not. maxval(abs([a(1, 2), a(1, 3), a(2, 3)])) > epsilon(a)**2*maxval(abs(a))) exit sweeps
-         do k = 1, 3
-            p = rows(k)
-            q = columns(k)
-            if (.not. abs(a(p, q)) > 0.0_wp) cycle
-            theta = (a(q, q) - a(p, p))/(2.0_wp*a(p, q))
-            t = sign(1.0_wp, theta)/(abs(theta) + sqrt(theta*theta + 1.0_wp))
-            c = 1.0_wp/sqrt(t*t + 1.0_wp)
-            s = t*c
-            turn = 0.0_wp
-            do i = 1, 3
-               turn(i, i) = 1.0_wp
-            end do
-            turn(p, p) = c
-            turn(q, q) = c
-            turn(p, q) = s
-            turn(q, p) = -s
-            a = matmul(transpose(turn), matmul(a, turn))
-            a(p, q) = 0.0_wp
-            a(q, p) = 0.0_wp
-            vectors = matmul(vectors, turn)
-         end do
-      end do sweeps
-      values = [a(1, 1), a(2, 2), a(3, 3)]
-   end subroutine diagonalise
 
 end module polydem_contact_modes
