@@ -85,7 +85,8 @@ def bound_of(scene, answer, disturbed):
                 continue
             row, twin = frames[frame.step]
             place, velocity = folded(scene, frame, twin.position - frame.position, twin.velocity - frame.velocity)
-            turn, spin = (scene.size*abs(a - b).max(initial=0.0) for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
+            turn, spin = (scene.size*abs(a - b).max(initial=0.0)
+                          for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
             energy = max(abs(other.balance[key][row] - answer.balance[key][k]) for key in ENERGIES)/scale
             force = abs(twin.wall_force - frame.wall_force).max()
             worst = np.maximum(worst, [max(abs(place).max(initial=0.0), turn), max(abs(velocity).max(initial=0.0), spin),
