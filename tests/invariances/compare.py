@@ -89,8 +89,8 @@ def bound_of(scene, answer, disturbed):
                           for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
             energy = max(abs(other.balance[key][row] - answer.balance[key][k]) for key in ENERGIES)/scale
             force = abs(twin.wall_force - frame.wall_force).max()
-            worst = np.maximum(worst, [max(abs(place).max(initial=0.0), turn), max(abs(velocity).max(initial=0.0), spin),
-                                       energy, force])
+            worst = np.maximum(worst, [max(abs(place).max(initial=0.0), turn),
+                                       max(abs(velocity).max(initial=0.0), spin), energy, force])
         bound.place[frame.step] = MARGIN*worst[0] + FLOOR*bound.size
         bound.velocity[frame.step] = MARGIN*worst[1] + FLOOR*bound.speed
         bound.energy[frame.step] = (MARGIN*worst[2] + ENERGY_FLOOR)*scale
@@ -168,9 +168,7 @@ def frame_difference(scene, answer, case, frame, twin, bound):
     if len(rows) != len(guests)*case.copies:
         return f"{len(rows)} other bodies instead of {len(guests)*case.copies}: {sorted(rows)[:4]}"
     pairs += match(scene, case, frame, twin, guests, list(rows.values()))
-    if not pairs:
-        return ""
-    one, two = (np.array(side, dtype=int) for side in zip(*pairs))
+    one, two = np.array(pairs, dtype=int).reshape(-1, 2).T
     place, velocity = deviations(scene, case, frame, twin, one, two)
     turn = twin.angle[two] - change.sense*frame.angle[one]
     if case.loose:
@@ -188,8 +186,8 @@ def frame_difference(scene, answer, case, frame, twin, bound):
     checks = (("position", np.hypot(*place.T), tolerances[0]), ("angle", abs(turn)*bound.size, tolerances[0]),
               ("velocity", np.hypot(*velocity.T), tolerances[1]), ("spin", abs(spin)*bound.size, tolerances[1]))
     for what, amount, tolerance in checks:
-        worst = int(np.argmax(amount))
-        if not amount[worst] <= tolerance:
+        if len(amount) and not amount.max() <= tolerance:
+            worst = int(np.argmax(amount))
             scale = bound.size if what in ("position", "angle") else bound.speed
             return (f"body {int(frame.id[one[worst]])} ({int(twin.id[two[worst]])}): {what} differs by "
                     f"{amount[worst]/scale:.1e} of the {'size' if scale == bound.size else 'speed'} "
