@@ -41,7 +41,7 @@ module polydem_overlap_measure
 
 contains
 
-   !> Whether overlaps with neighbouring pieces must count as one (`polydem_merged_overlaps`)
+   !> Whether overlaps with neighbouring pieces must count as one (`polydem_joined_overlaps`)
    elemental logical function joins(self)
       class(overlap_measure_t), intent(in) :: self
 

@@ -1,7 +1,7 @@
 !> Damping of contacts that act at once between two bodies, where all fixed bodies together count as one: the pieces of
 !> a floor or of a grain, the feet of a table.
 !>
-!> A dashpot for a given restitution belongs to all contacts of two bodies together (`polydem_contact_modes`), so the
+!> A dashpot for a given restitution belongs to all contacts of two bodies together (`polydem_shared_dashpots`), so the
 !> answer does not depend on how bodies are cut. A contact alone has that of its own point, and no share. Contacts with
 !> several free bodies do not share: a body of the mass M that hits n free bodies of the mass m at once has the damping
 !> ratio zeta sqrt((M + n m)/(M + m)).
@@ -12,8 +12,8 @@ module polydem_contact_shares
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_groups, only: contact_groups_t, list_groups
    use polydem_contact_history, only: contact_history_t
-   use polydem_contact_modes, only: add_spring, find_damping, find_modes, joined_spring, modes_t, spring_sums_t, &
-      spring_t
+   use polydem_shared_dashpots, only: add_spring, find_damping, find_motion, joined_spring, relative_motion_t, &
+      spring_sums_t, spring_t
    use polydem_fill_block, only: fill_block
    use polydem_force_law, only: force_law_t
    use polydem_joined_contacts, only: join_contacts, joined_contact_t, replace_overlap
@@ -40,9 +40,9 @@ module polydem_contact_shares
       type(spring_sums_t), allocatable, private :: joint(:)
       !> Next contact of the same group in the list, 0 at its end; first one of each group, 0 between two steps
       integer(ip), allocatable, private :: next(:), head(:)
-      !> Sums over the contacts of each group, and the modes of those with several, (group)
+      !> Sums over the contacts of each group, and the motion of those with several, (group)
       type(spring_sums_t), allocatable, private :: sums(:)
-      type(modes_t), allocatable, private :: modes(:)
+      type(relative_motion_t), allocatable, private :: motion(:)
       !> Second contact of each such group
       integer(ip), allocatable, private :: leader(:)
       !> Remembered edges of the pairs of each block, a copy
@@ -237,7 +237,7 @@ contains
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(n, shares) private(k)
       do k = 1_ip, n
          associate (leader => shares%leader(k), g => shares%groups%group(shares%leader(k)))
-            call find_modes(shares%spring(leader)%mobility, shares%sums(g), shares%modes(g))
+            call find_motion(shares%spring(leader)%mobility, shares%sums(g), shares%motion(g))
          end associate
       end do
       !$omp end parallel do
@@ -247,7 +247,7 @@ contains
          associate (g => shares%groups%group(k), joined => shares%joined(k))
             if (.not. shares%spring(k)%stiffness > 0.0_wp .or. is_other_part(joined, k)) cycle
             if (shares%sums(g)%n > 1_ip .or. joined%is_joined) &
-               call find_damping(shares%spring(k), shares%sums(g), shares%modes(g), shares%force(k), shares%dashpot(k))
+               call find_damping(shares%spring(k), shares%sums(g), shares%motion(g), shares%force(k), shares%dashpot(k))
          end associate
       end do
       if (shares%joins) call divide_joined(shares)
@@ -345,10 +345,10 @@ contains
       if (allocated(shares%head)) then
          if (size(shares%head) >= room) return
          room = max(2_ip*size(shares%head, kind=ip), room)
-         deallocate (shares%head, shares%sums, shares%modes)
+         deallocate (shares%head, shares%sums, shares%motion)
       end if
       allocate (shares%head(room), source=0_ip)
-      allocate (shares%sums(room), shares%modes(room))
+      allocate (shares%sums(room), shares%motion(room))
    end subroutine reserve
 
 end module polydem_contact_shares

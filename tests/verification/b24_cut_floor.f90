@@ -4,7 +4,7 @@
 !> a face and on a corner, at two speeds. Expected is the restitution of the namelist, except with the area law also at
 !> corners; with the area law corners have another one, which must be that of the whole floor. The contacts of a body
 !> with several fixed bodies share the dashpot (`contact_shares`). With the polar law the static depth is that of the
-!> whole floor, too (`merged_overlaps`). Shown are what no sharing mends: the static depth with the other laws, the
+!> whole floor, too (`joined_overlaps`). Shown are what no sharing mends: the static depth with the other laws, the
 !> restitution of a given damping coefficient, and, with the area law, that of a corner whose contact is longer than a
 !> piece: its parts have other lengths l than the whole.
 module b24_cut_floor

@@ -150,7 +150,7 @@ contains
    !> Compare the work of the border with the mean stress in the cell.
    subroutine compare_stress(table, tolerance)
       type(table_t), intent(inout) :: table
-      !> Of the ratio, whose standard deviation is about 1 %
+      !> Of the ratio, a mean over a fluctuating flow
       real(wp), intent(in) :: tolerance
       integer, parameter :: first = 10000, n_steps = 400000
       type(body_list_t) :: list

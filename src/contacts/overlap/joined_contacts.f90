@@ -1,4 +1,4 @@
-!> Contacts of one body with neighbouring pieces of another one that count as one overlap (`polydem_merged_overlaps`).
+!> Contacts of one body with neighbouring pieces of another one that count as one overlap (`polydem_joined_overlaps`).
 !>
 !> Bodies that are fixed count as one; they move alike or not at all where they have a flush joint.
 module polydem_joined_contacts
@@ -7,7 +7,7 @@ module polydem_joined_contacts
    use polydem_contact_block, only: contact_block_t, is_exchanged
    use polydem_describe_pairs, only: offset_of
    use polydem_kinds, only: ip, wp
-   use polydem_merged_overlaps, only: integrate_joined, join_loops, overlap_loop_t
+   use polydem_joined_overlaps, only: integrate_joined, join_loops, overlap_loop_t
    implicit none
    private
    public :: joined_contact_t, join_contacts, replace_overlap

@@ -1,7 +1,7 @@
 !> Normal damping for a given restitution: F = 2 zeta sqrt(m_eff k) v_n, where k = E L/l is the present stiffness of the
 !> contact and v_n = (dA/dt)/L. The effective mass m_eff is that of the contact point: 1/m_eff is the sum of 1/m + r^2/I
 !> over both bodies, r being the lever of the normal force. Several contacts between the same two bodies are damped
-!> together (`polydem_contact_modes`).
+!> together (`polydem_shared_dashpots`).
 !>
 !> A flat contact has a constant k. It is a damped spring that is released when its force vanishes (no attraction). Its
 !> restitution depends on the damping ratio zeta alone (T. Schwager & T. Poeschel, Granular Matter 9 (2007) 465):

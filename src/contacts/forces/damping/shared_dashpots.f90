@@ -9,8 +9,7 @@
 !>
 !>     w^2 = g^T Y g/(u^T K u),     g = K u = sum_i k_i v_i J_i^T,     u = K^+ g,
 !>
-!> and the ratio of each mode is zeta w_k/w. Every dashpot acts on its own rate, so damping never adds energy, and the
-!> force is 0 where nothing closes.
+!> and the ratio of each mode is zeta w_k/w. The power of these forces is that of u on K, never negative.
 !>
 !> K^+ = C S^+ C^T with S = C^T K C and Y = C C^T. Contacts whose normals are nearly parallel hardly hold the bodies
 !> sideways, so S^+ = (1 + h^2) (S^2 + h^2 tr(S)^2)^(-1) S with h = 3e-3: a mode counts half if its frequency is a
@@ -23,11 +22,11 @@
 !> at once, k_i J_i d /= f_i, as for a corner on many pieces; hence the factor
 !>
 !>     r^2 = Q^T K^+ Q/sum_i(f_i^2/k_i) <= 1,     Q = sum_i f_i J_i^T.
-module polydem_contact_modes
+module polydem_shared_dashpots
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: spring_t, spring_sums_t, modes_t, add_spring, joined_spring, find_modes, find_damping
+   public :: spring_t, spring_sums_t, relative_motion_t, add_spring, joined_spring, find_motion, find_damping
 
    !> One of several contacts between two bodies
    type :: spring_t
@@ -54,12 +53,12 @@ module polydem_contact_modes
    end type spring_sums_t
 
    !> The relative motion of two bodies
-   type :: modes_t
+   type :: relative_motion_t
       !> Motion u, of the springs; reciprocal frequency 1/w of this motion, 0 at rest
-      real(wp) :: motion(3) = 0.0_wp, period = 0.0_wp
+      real(wp) :: velocity(3) = 0.0_wp, period = 0.0_wp
       !> The factor r
       real(wp) :: factor = 1.0_wp
-   end type modes_t
+   end type relative_motion_t
 
    !> Square of h, the share of the greatest eigenvalue at which a mode has half its weight
    real(wp), parameter :: half_weight = 9.0e-6_wp
@@ -97,12 +96,12 @@ contains
    end function joined_spring
 
    !> Find the relative motion of two bodies.
-   pure subroutine find_modes(mobility, sums, modes)
+   pure subroutine find_motion(mobility, sums, motion)
       !> Mobility Y of one of the contacts
       real(wp), intent(in) :: mobility(3, 3)
       !> Sums over at least one contact
       type(spring_sums_t), intent(in) :: sums
-      type(modes_t), intent(out) :: modes
+      type(relative_motion_t), intent(out) :: motion
       real(wp) :: root(3, 3), s(3, 3), b(3, 3), force
       integer :: i, j
 
@@ -123,10 +122,10 @@ contains
       do j = 1, 3
          b(j, j) = b(j, j) + force
       end do
-      modes%motion = springs_give(sums%impulse)
+      motion%velocity = springs_give(sums%impulse)
       force = form(sums%impulse, mobility, sums%impulse)
-      if (force > 0.0_wp) modes%period = sqrt(max(0.0_wp, dot(sums%impulse, modes%motion))/force)
-      if (sums%squares > 0.0_wp) modes%factor = &
+      if (force > 0.0_wp) motion%period = sqrt(max(0.0_wp, dot(sums%impulse, motion%velocity))/force)
+      if (sums%squares > 0.0_wp) motion%factor = &
          sqrt(max(0.0_wp, min(1.0_wp, dot(sums%elastic, springs_give(sums%elastic))/sums%squares)))
 
    contains
@@ -141,7 +140,7 @@ contains
          motion = times(root, x)
       end function springs_give
 
-   end subroutine find_modes
+   end subroutine find_motion
 
    !> Solution of a system of equations with a symmetric, positive definite matrix, by its cofactors
    pure function solution(a, b) result(x)
@@ -156,23 +155,23 @@ contains
    end function solution
 
    !> Find the damping of one contact: its force and its dashpot, both over 2 zeta.
-   pure subroutine find_damping(spring, sums, modes, force, dashpot)
+   pure subroutine find_damping(spring, sums, motion, force, dashpot)
       type(spring_t), intent(in) :: spring
       !> Sums and motion of its two bodies
       type(spring_sums_t), intent(in) :: sums
-      type(modes_t), intent(in) :: modes
+      type(relative_motion_t), intent(in) :: motion
       !> The force [N/m]
       real(wp), intent(out) :: force
       !> The dashpot [N s/m2]
       real(wp), intent(out) :: dashpot
       real(wp) :: rigid, u(3), g(3)
 
-      associate (row => spring%row, k => modes%factor*spring%stiffness)
+      associate (row => spring%row, k => motion%factor*spring%stiffness)
          u = times(spring%mobility, row)
          g = times(sums%stiffness, u)
-         rigid = dot(row, modes%motion)
+         rigid = dot(row, motion%velocity)
          dashpot = k*sqrt(dot(g, u)/form(g, spring%mobility, g))
-         force = k*modes%period*rigid + dashpot*(spring%rate - rigid)
+         force = k*motion%period*rigid + dashpot*(spring%rate - rigid)
       end associate
    end subroutine find_damping
 
@@ -226,4 +225,4 @@ contains
       end do
    end subroutine find_root
 
-end module polydem_contact_modes
+end module polydem_shared_dashpots

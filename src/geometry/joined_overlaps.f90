@@ -12,7 +12,7 @@
 !>
 !> So cuts change no force, and a piece that begins to overlap begins with the area 0: the force is continuous as long
 !> as the parts of a cut end flush, or in a convex corner, where another body reaches.
-module polydem_merged_overlaps
+module polydem_joined_overlaps
    use polydem_clipping, only: usual_corners
    use polydem_kinds, only: ip, wp
    implicit none
@@ -191,4 +191,4 @@ contains
 
    end subroutine integrate_joined
 
-end module polydem_merged_overlaps
+end module polydem_joined_overlaps
