@@ -91,6 +91,11 @@ class Answer:
         return self.code not in (0, REFUSED, STOPPED) or bool(CRASH.search(self.message))
 
     @property
+    def degenerate(self):
+        """Whether there were contacts without a direction."""
+        return bool(re.search(r"^contacts without direction +[1-9]", self.log, re.MULTILINE))
+
+    @property
     def reason(self):
         """First line of the message, without the place."""
         lines = [line for line in self.message.splitlines() if line.startswith("polydem: ")]

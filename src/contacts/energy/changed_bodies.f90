@@ -1,4 +1,4 @@
-!> Bodies that enter or leave between two steps, in the energy balance.
+!> Bodies that enter, leave or change between two steps, in the energy balance.
 !>
 !> Works and impulses up to the end of a step have half of the last rates. What a body that leaves has felt until then
 !> is kept in `departed`. Its kinetic and potential energy and its momenta leave the values at the start; those that a
@@ -17,7 +17,7 @@ module polydem_changed_bodies
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: expect_changes, find_leaving_totals, take_leaving, start_entering, count_entering, n_totals
+   public :: expect_changes, find_leaving_totals, change_accelerations, take_leaving, start_entering, count_entering, n_totals
 
 contains
 
@@ -78,6 +78,28 @@ contains
       call all_reduce_exact_sums(comm, pushes)
       total(at_walls + 2:at_walls + 4) = total(at_walls + 2:at_walls + 4) + pushes%value()
    end subroutine find_leaving_totals
+
+   !> Count the impulse by which the first half step differs from that of the forces at the start, because bodies keep
+   !> the accelerations of an earlier run. Those had the predicted velocities of their step, and its walls and fields.
+   pure subroutine change_accelerations(sums, before, bodies)
+      !> Running sums with the forces at the start
+      type(energy_balance_t), intent(inout) :: sums
+      !> Bodies with the accelerations of these forces, and with those that they keep
+      type(bodies_t), intent(in) :: before, bodies
+      real(wp) :: push(2), turn
+      integer(ip) :: k
+
+      if (.not. allocated(sums%wall_sum)) return
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (s => bodies%free(k))
+            push = 0.5_wp*bodies%mass(s)*(bodies%acceleration(:, s) - before%acceleration(:, s))
+            turn = 0.5_wp*bodies%inertia(s)*(bodies%angular_acceleration(s) - before%angular_acceleration(s))
+            associate (x => bodies%position(:, s))
+               sums%wall_sum(2:4, s) = sums%wall_sum(2:4, s) + [push, turn + (x(1)*push(2) - x(2)*push(1))]
+            end associate
+         end associate
+      end do
+   end subroutine change_accelerations
 
    !> Add a force at a point, and its torque about the origin.
    pure subroutine add_push(point, force, pushes)

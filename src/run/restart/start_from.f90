@@ -9,6 +9,7 @@ module polydem_start_from
    use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_changed_bodies, only: change_accelerations
    use polydem_checkpoint_bodies, only: read_bodies
    use polydem_checkpoint_fields, only: attempts_t, read_pairs, serialize_progress
    use polydem_checkpoint_file, only: checkpoint_file_t
@@ -339,6 +340,7 @@ contains
             bodies%acceleration(:, s) = before%acceleration(:, s)
             bodies%angular_acceleration(s) = before%angular_acceleration(s)
          end do
+         call change_accelerations(simulation%energy_balance, before, bodies)
       end associate
       call file%close(error)
       if (allocated(error)) return
