@@ -44,7 +44,7 @@ contains
       real(wp), intent(in) :: tolerance
       !> Overlaps of one body; all but their vertices is set or changed
       type(overlap_loop_t), intent(inout) :: loops(:)
-      integer(ip) :: i, j, k, l, from, to
+      integer(ip) :: i, j, k, l, m, from, to
 
       do k = 1_ip, size(loops, kind=ip)
          loops(k)%part_of = k
@@ -58,7 +58,9 @@ contains
             loops(l)%on_outline(j) = .false.
             from = max(loops(k)%part_of, loops(l)%part_of)
             to = min(loops(k)%part_of, loops(l)%part_of)
-            where (loops%part_of == from) loops%part_of = to
+            do m = 1_ip, size(loops, kind=ip)
+               if (loops(m)%part_of == from) loops(m)%part_of = to
+            end do
          end do
       end do
    end subroutine join_loops

@@ -90,7 +90,7 @@ contains
          associate (i => contacts%first(c), j => contacts%second(c))
             values(:, k) = real([real(bodies%id(i), wp), real(bodies%id(j), wp), &
                                  bodies%position(:, i) + contacts%arm_first(:, c), contacts%area(c), &
-                                 contacts%area(c)/contacts%length(c), depth_share(contacts, thinner, c)], dp)
+                                 contacts%depth(c), depth_share(contacts, thinner, c)], dp)
          end associate
       end do
       call order_pairs(comm, bodies, contacts%first(deep), contacts%second(deep), rows)

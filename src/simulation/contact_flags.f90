@@ -81,7 +81,7 @@ contains
 
       deepest = -1.0_wp
       do c = 1_ip, block%n
-         deepest = max(deepest, max(block%degenerate(c), block%area(c) - limits%shallow*block%length(c), &
+         deepest = max(deepest, max(block%degenerate(c), block%depth(c) - limits%shallow, &
                                     block%length(c)*block%inverse_length(c)*block%mobility(c) - limits%soft))
       end do
       any_suspect = deepest > 0.0_wp
@@ -116,7 +116,7 @@ contains
          suspect(c) = block%degenerate(c) > 0.0_wp &
             .or. block%length(c)*block%inverse_length(c)*block%mobility(c) > limits%soft
          if (suspect(c) .or. limits%least_depth >= huge(1.0_wp)) cycle
-         suspect(c) = block%area(c) > limits%least_depth*block%length(c)*thinner_of(bodies, block, c)
+         suspect(c) = block%depth(c) > limits%least_depth*thinner_of(bodies, block, c)
       end do
    end subroutine find_suspects
 
@@ -142,7 +142,7 @@ contains
       logical, intent(in) :: reversed
 
       associate (i => block%first(c), j => block%second(c))
-         passes = block%area(c) > least_depth*block%length(c)*thinner_of(bodies, block, c)
+         passes = block%depth(c) > least_depth*thinner_of(bodies, block, c)
          if (.not. passes .or. reversed) return
          if (bodies%pieces%most > 1_ip) then
             passes = piece_inside(bodies, i, j, block%piece(c, 1), block%piece(c, 2)) &

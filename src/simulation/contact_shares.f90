@@ -16,7 +16,7 @@ module polydem_contact_shares
       spring_sums_t, spring_t
    use polydem_fill_block, only: fill_block
    use polydem_force_law, only: force_law_t
-   use polydem_joined_contacts, only: join_contacts, joined_contact_t, replace_overlap
+   use polydem_joined_contacts, only: join_contacts, joined_contact_t, overlap_loop_t, replace_overlap
    use polydem_kinds, only: ip, min_parallel_size, wp
    use polydem_normal_damping, only: find_reaches
    use polydem_pair_list, only: pair_list_t
@@ -35,6 +35,10 @@ module polydem_contact_shares
       !> Whether overlaps with neighbouring pieces count as one, and what replaces them
       logical, private :: joins = .false.
       type(joined_contact_t), allocatable, private :: joined(:)
+      !> Members of groups with several contacts: number in the list, both pieces, and work space
+      integer(ip), allocatable, private :: member(:), pieces(:, :)
+      type(overlap_loop_t), allocatable, private :: loops(:)
+      type(joined_contact_t), allocatable, private :: new(:)
       !> Contacts before they are joined, and sums over those that are, by the first one of them
       type(spring_t), allocatable, private :: part(:)
       type(spring_sums_t), allocatable, private :: joint(:)
@@ -95,9 +99,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(pair_list_t), intent(in) :: pairs
       type(contact_shares_t), intent(inout) :: shares
-      integer(ip) :: head, k, n
-      integer(ip), allocatable :: list(:)
-      type(joined_contact_t), allocatable :: new(:)
+      integer(ip) :: head, j, k, m, n, n_groups
 
       ! The contacts of each group become a chain in ascending order; `head` has its first one.
       do k = shares%groups%n, 1_ip, -1_ip
@@ -106,25 +108,70 @@ contains
          shares%next(k) = shares%head(shares%groups%group(k))
          shares%head(shares%groups%group(k)) = k
       end do
+      ! The groups with several contacts, one after another; `leader` has the first contact of each, and the end.
+      n_groups = 0_ip
+      m = 0_ip
       do k = 1_ip, shares%groups%n
          head = shares%head(shares%groups%group(k))
          shares%head(shares%groups%group(k)) = 0_ip
          if (head == 0_ip) cycle
-         list = [integer(ip) ::]
+         if (shares%next(head) == 0_ip) cycle
+         n_groups = n_groups + 1_ip
+         shares%leader(n_groups) = m + 1_ip
          n = head
          do while (n > 0_ip)
-            list = [list, n]
+            m = m + 1_ip
+            shares%member(m) = n
+            shares%pieces(:, m) = [pairs%first(shares%groups%pair(n)), pairs%second(shares%groups%pair(n))]
             n = shares%next(n)
          end do
-         if (size(list) < 2) cycle
-         allocate (new(size(list)))
-         call join_contacts(bodies, pairs%first(shares%groups%pair(list)), pairs%second(shares%groups%pair(list)), new)
-         new%first = list(max(1_ip, new%first))
-         shares%joined(list) = new
-         shares%joins = shares%joins .or. any(new%is_joined)
-         deallocate (new)
+      end do
+      if (m == 0_ip) return
+      shares%leader(n_groups + 1_ip) = m + 1_ip
+      call reserve_loops(m, shares)
+      !$omp parallel do if (m > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(bodies, shares, n_groups) private(j)
+      do j = 1_ip, n_groups
+         associate (low => shares%leader(j), high => shares%leader(j + 1_ip) - 1_ip)
+            call join_contacts(bodies, shares%pieces(:, low:high), shares%loops(low:high), shares%new(low:high))
+            call keep_joined(low, high, shares)
+         end associate
+      end do
+      !$omp end parallel do
+      do k = 1_ip, m
+         shares%joins = shares%joins .or. shares%new(k)%is_joined
       end do
    end subroutine join_groups
+
+   !> Keep what became of the contacts of one group.
+   pure subroutine keep_joined(low, high, shares)
+      !> Its first and last member
+      integer(ip), intent(in) :: low, high
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: k
+
+      do k = low, high
+         associate (joined => shares%joined(shares%member(k)))
+            joined = shares%new(k)
+            if (joined%is_joined) joined%first = shares%member(low + joined%first - 1_ip)
+         end associate
+      end do
+   end subroutine keep_joined
+
+   !> Make room for n members of groups with several contacts.
+   subroutine reserve_loops(n, shares)
+      integer(ip), intent(in) :: n
+      type(contact_shares_t), intent(inout) :: shares
+      integer(ip) :: room
+
+      room = n
+      if (allocated(shares%loops)) then
+         if (size(shares%loops) >= n) return
+         room = max(2_ip*size(shares%loops, kind=ip), n)
+         deallocate (shares%loops, shares%new)
+      end if
+      allocate (shares%loops(room), shares%new(room))
+   end subroutine reserve_loops
 
    !> Find some listed contacts, at most a block.
    subroutine find_springs(law, bodies, pairs, history, low, high, shares)
@@ -331,11 +378,13 @@ contains
       room = size(shares%groups%pair, kind=ip)
       if (allocated(shares%force)) then
          if (size(shares%force) < room) deallocate (shares%force, shares%dashpot, shares%spring, shares%joined, &
-                                                    shares%part, shares%joint, shares%next, shares%leader, shares%mine)
+                                                    shares%part, shares%joint, shares%next, shares%leader, shares%mine, &
+                                                    shares%member, shares%pieces)
       end if
       if (.not. allocated(shares%force)) then
          allocate (shares%force(room), shares%dashpot(room), shares%spring(room), shares%joined(room), &
-                   shares%part(room), shares%joint(room), shares%next(room), shares%leader(room))
+                   shares%part(room), shares%joint(room), shares%next(room), shares%leader(room + 1_ip))
+         allocate (shares%member(room), shares%pieces(2, room))
          allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
          do k = 1_ip, size(shares%mine, kind=ip)
             allocate (shares%mine(k)%features(block_size))

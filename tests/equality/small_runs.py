@@ -10,11 +10,11 @@ import sys
 RUNS = {
     "drum.nml": ["scene.bodies=400", "scene.motion_start=0", "scene.motion_ramp=0.02", "integrate.dt=2.5e-5",
                  "integrate.duration=0.15"],
-    "hopper.nml": ["scene.bodies=300", "integrate.dt=2.5e-5", "integrate.duration=0.1"],
-    "gas.nml": ["scene.bodies=300", "integrate.dt=2.5e-5", "integrate.duration=0.1"],
-    "heap.nml": ["scene.bodies=200", "integrate.dt=2.5e-5", "integrate.duration=0.1"],
-    "stack.nml": ["integrate.dt=2.5e-5", "integrate.duration=0.1"],
-    "incline.nml": ["integrate.dt=2.5e-5", "integrate.duration=0.1"],
+    "hopper.nml": ["scene.bodies=300", "integrate.dt=1.25e-5", "integrate.duration=0.1"],
+    "gas.nml": ["scene.bodies=300", "integrate.dt=1.25e-5", "integrate.duration=0.1"],
+    "heap.nml": ["scene.bodies=200", "integrate.dt=1.25e-5", "integrate.duration=0.1"],
+    "stack.nml": ["integrate.dt=1.25e-5", "integrate.duration=0.1"],
+    "incline.nml": ["integrate.dt=1.25e-5", "integrate.duration=0.1"],
 }
 
 

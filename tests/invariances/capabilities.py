@@ -4,7 +4,7 @@
 LONG = 0.5
 CONTAINERS = ("plane", "periodic_x", "periodic_y", "periodic_xy", "sheared", "stress_controlled")
 WITHOUT_WALLS = {"periodic_xy", "sheared", "stress_controlled"}
-LAWS = ("conservative", "area")
+LAWS = ("polar", "conservative", "area")
 #: What a model of contacts has one each of
 KINDS = tuple(tuple(f"{kind}_{name}" for name in names) for kind, names in (
     ("scheme", ("velocity_verlet", "compensated", "gear", "gear_3_20")),

@@ -32,7 +32,7 @@ program replaced_bodies
    implicit none
 
    !> Settings; the scene is not used
-   character(len=*), parameter :: text = "&scene name = 'gas' bodies = 1 speed = 1 / &forces stiffness = 1e6 "// &
+   character(len=*), parameter :: text = "&scene name = 'gas' bodies = 1 speed = 1 / &forces stiffness = 1e5 "// &
       'friction_coefficient = 0.4 / &integrate dt = 2e-5 duration = 1 / &decomposition margin = 2e-3 /'
    !> Finders and schemes of integration that are tried
    character(len=*), parameter :: finders(3) = [character(len=16) :: 'two_level', 'sort_and_sweep', 'verlet']
@@ -41,7 +41,7 @@ program replaced_bodies
    !> Rows and columns of the heap, and number of bodies of the pile: the heap and three walls
    integer(ip), parameter :: n_rows = 6_ip, n_columns = 7_ip, n_pile = n_rows*n_columns + 3_ip
    !> Steps of a run, and the step before which bodies are replaced
-   integer, parameter :: n_steps = 600, middle = 300
+   integer, parameter :: n_steps = 900, middle = 450
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error
    type(simulation_t) :: whole, pile

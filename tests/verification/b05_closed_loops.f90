@@ -48,22 +48,28 @@ contains
    subroutine run_closed_loops(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
+      character(len=15), parameter :: with_energy(4) = [character(len=15) :: 'polar', 'conservative', 'own_length', &
+                                                        'effective_polar']
+      character(len=:), allocatable :: name
       real(wp) :: coarse, fine
-      integer :: k
+      integer :: j, k
 
       call table%begin('B5', 'work of the elastic force on closed paths, as a share of the absolute work')
-      do k = 1, size(smooth)
-         call table%expect_absolute('conservative law, path '//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
-                                    work('conservative', smooth(k), 400), 1.0e-13_wp)
+      do j = 1, size(with_energy)
+         name = trim(with_energy(j))//' law, path '
+         do k = 1, size(smooth)
+            call table%expect_absolute(name//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
+                                       work(trim(with_energy(j)), smooth(k), 400), 1.0e-13_wp)
+         end do
+         coarse = work(trim(with_energy(j)), tilting, 250)
+         fine = work(trim(with_energy(j)), tilting, 16000)
+         call table%expect_absolute(name//'6 with events, 250 steps', 0.0_wp, coarse, 1.0e-4_wp)
+         call table%expect_absolute(name//'6 with events, 16000 steps', 0.0_wp, fine, 1.0e-7_wp)
       end do
       do k = 1, size(smooth)
          call table%expect_absolute('conservative law with cohesion, path '//to_text(int(k, ip))//', 400 steps', &
                                     0.0_wp, work('conservative', smooth(k), 400, attraction), 1.0e-13_wp)
       end do
-      coarse = work('conservative', tilting, 250)
-      fine = work('conservative', tilting, 16000)
-      call table%expect_absolute('conservative law, path 6 with events, 250 steps', 0.0_wp, coarse, 1.0e-4_wp)
-      call table%expect_absolute('conservative law, path 6 with events, 16000 steps', 0.0_wp, fine, 1.0e-7_wp)
       do k = 1, size(smooth)
          fine = work('area', smooth(k), 1600)
          call table%expect_relative('area law, path '//to_text(int(k, ip))//': 400 steps as 1600 steps', fine, &

@@ -39,6 +39,8 @@ module polydem_contact_block
       real(wp) :: direction(block_size, 2)
       !> 1 for a degenerate contact, else 0
       real(wp) :: degenerate(block_size)
+      !> Depth of the overlap [m]
+      real(wp) :: depth(block_size)
       !> Velocities of the centres of both bodies, (contact, x or y) [m/s]
       real(wp) :: velocity_first(block_size, 2), velocity_second(block_size, 2)
       !> Angular velocities of the first and of the second body, (contact, body) [rad/s]
@@ -139,6 +141,7 @@ contains
          block%direction(b, :) = side*contacts%direction(:, c)
          block%length(b) = contacts%length(c)
          block%length_square(b) = contacts%length_square(c)
+         block%depth(b) = contacts%depth(c)
          block%degenerate(b) = merge(1.0_wp, 0.0_wp, is_degenerate(contacts, c))
          block%inverse_length(b) = contacts%inverse_length(c)
          block%lever(b) = side*contacts%lever(c)
@@ -198,6 +201,7 @@ contains
       contacts%direction(:, c) = side*block%direction(b, :)
       contacts%length(c) = block%length(b)
       contacts%length_square(c) = block%length_square(b)
+      contacts%depth(c) = block%depth(b)
    end subroutine store_contact
 
 end module polydem_contact_block

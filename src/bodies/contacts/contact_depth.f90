@@ -1,8 +1,7 @@
 !> Depth of contacts relative to the size of their bodies.
 !>
-!> The depth of a contact is its area over its length, which is the mean depth of the overlap. Its share is the depth
-!> over the thickness of the thinner of the two pieces that touch; a convex body is one piece. A share of about 0.5
-!> means that one body is passing through the other.
+!> The share of a contact is its depth, the mean depth of the overlap, over the thickness of the thinner of the two pieces
+!> that touch; a convex body is one piece. A share of about 0.5 means that one body is passing through the other.
 module polydem_contact_depth
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
@@ -42,7 +41,7 @@ contains
       !> Index of the contact
       integer(ip), intent(in) :: c
 
-      depth_share = contacts%area(c)/(contacts%length(c)*thinner(c))
+      depth_share = contacts%depth(c)/thinner(c)
    end function depth_share
 
    !> The contact with the greatest share, 0 if there are no contacts
@@ -78,7 +77,7 @@ contains
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(contacts, thinner, limit) private(c) reduction(.or.:deeper)
       do c = 1_ip, contacts%n
-         deeper = deeper .or. contacts%area(c) > limit*contacts%length(c)*thinner(c)
+         deeper = deeper .or. contacts%depth(c) > limit*thinner(c)
       end do
       !$omp end parallel do
       any_deeper = deeper
@@ -98,7 +97,7 @@ contains
          text = 'the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
             to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
             to_text(bodies%position(2, i) + contacts%arm_first(2, c))//') m overlap by '// &
-            to_text(contacts%area(c)/contacts%length(c), 3)//' m, '// &
+            to_text(contacts%depth(c), 3)//' m, '// &
             to_text(depth_share(contacts, thinner, c), 3)//' of the thinner body'
       end associate
    end function depth_text

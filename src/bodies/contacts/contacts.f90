@@ -51,6 +51,8 @@ module polydem_contacts
       real(wp), allocatable :: length(:)
       !> Square of the length of the overlap; 0 if the measure does not contain it [m2]
       real(wp), allocatable :: length_square(:)
+      !> Depth of the overlap: area over length, of contacts that are joined that of all [m]
+      real(wp), allocatable :: depth(:)
       !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
       !> materials to that of the law if materials differ [1/m]
       real(wp), allocatable :: inverse_length(:)
@@ -121,6 +123,7 @@ contains
       call grow(contacts%direction, kept, m, 0.0_wp)
       call grow(contacts%length, kept, m, 0.0_wp)
       call grow(contacts%length_square, kept, m, 0.0_wp)
+      call grow(contacts%depth, kept, m, 0.0_wp)
       call grow(contacts%inverse_length, kept, m, 0.0_wp)
       call grow(contacts%lever, kept, m, 0.0_wp)
       call grow(contacts%elastic, kept, m, 0.0_wp)
@@ -153,6 +156,7 @@ contains
       to%direction(:, d) = from%direction(:, c)
       to%length(d) = from%length(c)
       to%length_square(d) = from%length_square(c)
+      to%depth(d) = from%depth(c)
       to%inverse_length(d) = from%inverse_length(c)
       to%lever(d) = from%lever(c)
       to%elastic(d) = from%elastic(c)

@@ -17,7 +17,8 @@ module polydem_changed_bodies
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: expect_changes, find_leaving_totals, change_accelerations, take_leaving, start_entering, count_entering, n_totals
+   public :: change_accelerations, expect_changes, find_leaving_totals, &
+      take_leaving, start_entering, count_entering, n_totals
 
 contains
 

@@ -106,6 +106,7 @@ contains
       if (allocated(bodies%cell%load)) call add_stretching(bodies, block)
       call find_rates_and_directions(block)
       if (.not. all_certified) call direct_from_centres(bodies, block)
+      call find_depths(block)
    end subroutine fill
 
    !> Select the next pairs that may be contacts: those that no remembered edge separates.
@@ -355,6 +356,17 @@ contains
          if (distance > no_length*block%length(c)) block%direction(c, :) = -offset/distance
       end do
    end subroutine direct_from_centres
+
+   !> Find the depths of the overlaps: area over length. With an area that is not the true one, this is how far a body has
+   !> to move until the area is zero if it falls at a constant rate.
+   pure subroutine find_depths(block)
+      type(contact_block_t), intent(inout) :: block
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         block%depth(c) = block%area(c)/block%length(c)
+      end do
+   end subroutine find_depths
 
    !> Length of a vector
    elemental real(wp) function length_of(x, y)

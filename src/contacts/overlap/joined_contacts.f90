@@ -10,7 +10,7 @@ module polydem_joined_contacts
    use polydem_joined_overlaps, only: integrate_joined, join_loops, overlap_loop_t
    implicit none
    private
-   public :: joined_contact_t, join_contacts, replace_overlap
+   public :: joined_contact_t, overlap_loop_t, join_contacts, replace_overlap
 
    !> What replaces the overlap of one of several contacts between two bodies
    type :: joined_contact_t
@@ -25,6 +25,8 @@ module polydem_joined_contacts
       real(wp) :: normal(2) = 0.0_wp, moment(2) = 0.0_wp
       !> Square of the length of the overlap, for the share of this contact [m2]
       real(wp) :: length_square = 0.0_wp
+      !> Depth of the joined overlap [m]
+      real(wp) :: depth = 0.0_wp
    end type joined_contact_t
 
    !> Distance of points that count as one over the radius of the body
@@ -33,33 +35,69 @@ module polydem_joined_contacts
 contains
 
    !> Join the contacts of one body with another one, or with all fixed ones.
-   pure subroutine join_contacts(bodies, first, second, contacts)
+   pure subroutine join_contacts(bodies, pieces, loops, contacts)
       !> Bodies with turned polygons
       type(bodies_t), intent(in) :: bodies
-      !> Lower and higher piece of each contact
-      integer(ip), intent(in) :: first(:), second(:)
+      !> Lower and higher piece of each contact, (2, contact)
+      integer(ip), intent(in) :: pieces(:, :)
+      !> Work space, one for each contact
+      type(overlap_loop_t), intent(inout) :: loops(:)
       !> The contacts; all is set
       type(joined_contact_t), intent(inout) :: contacts(:)
-      type(overlap_loop_t) :: loops(size(first))
       real(wp) :: from_other(2)
       integer(ip) :: k
 
-      do k = 1_ip, size(first, kind=ip)
+      do k = 1_ip, size(pieces, 2, kind=ip)
          contacts(k) = joined_contact_t()
-         call find_loop(bodies, first(k), second(k), contacts(k)%body, loops(k))
+         call find_loop(bodies, pieces(1, k), pieces(2, k), contacts(k)%body, loops(k))
       end do
       call join_loops(tolerance*bodies%radius(contacts(1)%body), loops)
-      do k = 1_ip, size(first, kind=ip)
-         if (loops(k)%n == 0_ip .or. count(loops%part_of == loops(k)%part_of .and. loops%n > 0_ip) < 2) cycle
+      do k = 1_ip, size(pieces, 2, kind=ip)
+         if (loops(k)%n == 0_ip .or. parts_of(loops, loops(k)%part_of) < 2_ip) cycle
          associate (new => contacts(k))
             new%is_joined = .true.
             new%first = loops(k)%part_of
             call integrate_joined(loops, k, new%normal, new%moment(1), new%length_square)
-            from_other = offset_of(bodies, other_of(bodies, first(k), second(k), new%body), new%body)
+            from_other = offset_of(bodies, other_of(bodies, pieces(1, k), pieces(2, k), new%body), new%body)
             new%moment(2) = new%moment(1) + (from_other(1)*new%normal(2) - from_other(2)*new%normal(1))
          end associate
       end do
+      do k = 1_ip, size(pieces, 2, kind=ip)
+         if (contacts(k)%is_joined) contacts(k)%depth = joined_depth(loops, contacts, contacts(k)%first)
+      end do
    end subroutine join_contacts
+
+   !> Depth of a joined overlap [m]
+   pure real(wp) function joined_depth(loops, contacts, first)
+      type(overlap_loop_t), intent(in) :: loops(:)
+      type(joined_contact_t), intent(in) :: contacts(:)
+      !> Number of its first contact
+      integer(ip), intent(in) :: first
+      real(wp) :: area, normal(2)
+      integer(ip) :: k
+
+      area = 0.0_wp
+      normal = 0.0_wp
+      do k = 1_ip, size(contacts, kind=ip)
+         if (.not. contacts(k)%is_joined .or. contacts(k)%first /= first) cycle
+         area = area + loops(k)%area
+         normal = normal + contacts(k)%normal
+      end do
+      joined_depth = area/max(sqrt(normal(1)**2 + normal(2)**2), tiny(area))
+   end function joined_depth
+
+   !> Number of overlaps that are joined with the given one, itself included
+   pure integer(ip) function parts_of(loops, part)
+      type(overlap_loop_t), intent(in) :: loops(:)
+      !> Number of the first one
+      integer(ip), intent(in) :: part
+      integer(ip) :: k
+
+      parts_of = 0_ip
+      do k = 1_ip, size(loops, kind=ip)
+         if (loops(k)%n > 0_ip .and. loops(k)%part_of == part) parts_of = parts_of + 1_ip
+      end do
+   end function parts_of
 
    !> The body of a pair of pieces that is not the given one
    pure integer(ip) function other_of(bodies, first, second, body)
@@ -76,7 +114,7 @@ contains
       integer(ip), intent(in) :: first, second
       !> Slot of this body
       integer(ip), intent(out) :: body
-      type(overlap_loop_t), intent(out) :: loop
+      type(overlap_loop_t), intent(inout) :: loop
       real(wp) :: offset(2), arm(2)
       integer(ip) :: i, j, a, b, k
       logical :: swapped
@@ -95,12 +133,10 @@ contains
          offset = offset + (bodies%pieces%arm(:, b) - arm)
       end if
       if (radius_of(bodies, b) < radius_of(bodies, a)) then
-         call clip_loop(outline_of(bodies, b), outline_of(bodies, a), -offset, radius_of(bodies, b), &
-                        loop%n, loop%vertex, loop%on_outline)
+         call clip_pieces(bodies, b, a, -offset, loop)
          arm = arm + offset
       else
-         call clip_loop(outline_of(bodies, a), outline_of(bodies, b), offset, radius_of(bodies, a), &
-                        loop%n, loop%vertex, loop%on_outline)
+         call clip_pieces(bodies, a, b, offset, loop)
          loop%on_outline(:loop%n) = .not. loop%on_outline(:loop%n)
       end if
       do k = 1_ip, loop%n
@@ -108,18 +144,29 @@ contains
       end do
    end subroutine find_loop
 
-   !> Turned vertices of a piece relative to its own centre [m]
-   pure function outline_of(bodies, piece) result(outline)
+   !> Find the outline of the overlap of two pieces, relative to the centre of the first one.
+   pure subroutine clip_pieces(bodies, subject, clipper, offset, loop)
       type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: piece
-      real(wp), allocatable :: outline(:, :)
+      integer(ip), intent(in) :: subject, clipper
+      !> Centre of the clipper minus centre of the subject [m]
+      real(wp), intent(in) :: offset(2)
+      !> Its vertices are set, and which of its edges are on the outline of the clipper
+      type(overlap_loop_t), intent(inout) :: loop
 
-      if (bodies%pieces%most > 1_ip) then
-         outline = bodies%pieces%outline(:, bodies%pieces%start(piece):bodies%pieces%start(piece + 1_ip) - 1_ip)
-      else
-         outline = bodies%pieces%turned_polygon(piece)
-      end if
-   end function outline_of
+      associate (pieces => bodies%pieces)
+         if (pieces%most > 1_ip) then
+            call clip_loop(pieces%outline(:, pieces%start(subject):pieces%start(subject + 1_ip) - 1_ip), &
+                           pieces%outline(:, pieces%start(clipper):pieces%start(clipper + 1_ip) - 1_ip), &
+                           offset, radius_of(bodies, subject), loop%n, loop%vertex, loop%on_outline)
+         else
+            associate (start => pieces%vertex_start)
+               call clip_loop(pieces%turned(:, start(subject):start(subject + 1_ip) - 1_ip), &
+                              pieces%turned(:, start(clipper):start(clipper + 1_ip) - 1_ip), &
+                              offset, radius_of(bodies, subject), loop%n, loop%vertex, loop%on_outline)
+            end associate
+         end if
+      end associate
+   end subroutine clip_pieces
 
    !> Radius of a piece [m]
    pure real(wp) function radius_of(bodies, piece)
@@ -151,6 +198,7 @@ contains
       end if
       block%length(c) = sqrt(new%normal(1)**2 + new%normal(2)**2)
       block%length_square(c) = new%length_square
+      block%depth(c) = new%depth
       block%rate(c) = dot_product(block%normal(c, :), block%velocity_first(c, :) - block%velocity_second(c, :)) &
          + (block%moment(c, 1)*block%angular_velocity(c, 1) - block%moment(c, 2)*block%angular_velocity(c, 2))
       block%direction(c, :) = -block%normal(c, :)/max(block%length(c), tiny(block%length(c)))

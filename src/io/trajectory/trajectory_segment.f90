@@ -241,7 +241,7 @@ contains
             values(1, c) = real(contacts%area(c), dp)
             values(2:3, c) = real(bodies%position(:, contacts%first(c)) + (contacts%arm_first(:, c) + shift), dp)
             values(4:5, c) = real(-contacts%direction(:, c), dp)
-            values(6, c) = real(sqrt(contacts%normal(1, c)**2 + contacts%normal(2, c)**2), dp)
+            values(6, c) = real(contacts%area(c)/contacts%depth(c), dp)
             values(7:8, c) = real(contact_force(contacts, c), dp)
             values(9, c) = real(couple, dp)
          end do
@@ -267,7 +267,7 @@ contains
       call file%write('/contacts/normal', vector(block, 4), error, '1', 'unit normal from the first body into the '// &
                       'second', part, rows=many_rows)
       call file%write('/contacts/length', component(block, 6), error, 'm', &
-                      'length of the contact; that area has the gradient length times normal', part, rows=many_rows)
+                      'length of the contact: the area over the depth', part, rows=many_rows)
       call file%write('/contacts/force', vector(block, 7), error, 'N/m', &
                       'force on the first body; the second feels the opposite', part, rows=many_rows)
       call file%write('/contacts/couple', component(block, 9), error, 'N', &

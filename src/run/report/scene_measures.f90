@@ -218,7 +218,7 @@ contains
          place = place_of(bodies, contacts%first(worst), contacts%second(worst))
       end if
       do c = 1_ip, contacts%n
-         depth = contacts%area(c)/contacts%length(c)
+         depth = contacts%depth(c)
          if (depth <= greatest) cycle
          greatest = depth
          worst = c

@@ -39,8 +39,9 @@ module polydem_relaxation
 
 contains
 
-   !> Push bodies apart until no contact is deeper than `remove_overlap` of &scene. Collective; all ranks get the same
-   !> error.
+   !> Push bodies apart until no contact is deeper than `remove_overlap` of &scene: first with depths of the true area,
+   !> which push apart however deep an overlap is, at last with those of the law, which may be greater at corners.
+   !> Collective; all ranks get the same error.
    subroutine relax_bodies(self, error)
       !> The simulation before time 0; positions and angles of free bodies change, and `relaxation` is set
       type(simulation_t), intent(inout) :: self
@@ -51,9 +52,10 @@ contains
       real(wp), allocatable :: thinner(:)
       real(wp) :: greatest(1), least, before(2)
       integer(ip) :: worst
-      logical :: is_idle
+      logical :: is_idle, has_depth_of_law
 
       least = huge(least)
+      has_depth_of_law = .false.
       self%relaxation%from = self%bodies%position
       do
          call find_overlaps(self, neighbours, contacts, error)
@@ -67,7 +69,12 @@ contains
          associate (relaxation => self%relaxation)
             relaxation%after = greatest(1)
             if (relaxation%sweeps == 0_ip) relaxation%before = relaxation%after
-            if (relaxation%after <= self%settings%scene%remove_overlap) exit
+            if (relaxation%after <= self%settings%scene%remove_overlap) then
+               if (has_depth_of_law) exit
+               has_depth_of_law = .true.
+               contacts%measure = self%law%overlap_measure
+               cycle
+            end if
             least = min(least, relaxation%after)
             call check_progress(relaxation, self%bodies, self%comm, least, before, is_idle)
             if (is_idle .or. relaxation%sweeps == most_sweeps) then
@@ -209,7 +216,7 @@ contains
             mobility = mobility_of(contacts%first(c), contacts%arm_first(:, c), direction, numbers, bodies) &
                + mobility_of(contacts%second(c), contacts%arm_second(:, c), direction, numbers, bodies)
          end associate
-         impulse(c) = contacts%area(c)/(contacts%length(c)*mobility)
+         impulse(c) = contacts%depth(c)/mobility
       end do
       !$omp end parallel do
    end subroutine find_impulses
