@@ -186,7 +186,7 @@ contains
             former = paths(cell)
             moved = paths(other)
          end if
-         do step = 1, 2000
+         do step = 1, 1500
             if (.not. allocated(error)) call steps(cell, 1, error)
             if (.not. allocated(error)) call steps(other, 1, error)
             call table%note_error(error)
@@ -198,7 +198,7 @@ contains
          end do
          worst = max(worst, maxval(abs((paths(cell) - former) - (paths(other) - moved))))
       end do
-      call table%expect_true('moved border: the same pairs in 4 x 2000 steps', same)
+      call table%expect_true('moved border: the same pairs in 4 x 1500 steps', same)
       call table%expect_absolute('moved border: distance from the paths, over the side', 0.0_wp, worst/side, 1.0e-12_wp)
    end subroutine move_border
 
@@ -219,9 +219,9 @@ contains
       if (.not. allocated(error)) then
          from_cell = paths(cell)
          from_other = paths(other)
-         call steps(cell, 2000, error)
+         call steps(cell, 1500, error)
       end if
-      if (.not. allocated(error)) call steps(other, 2000, error)
+      if (.not. allocated(error)) call steps(other, 1500, error)
       call table%note_error(error)
       if (allocated(error)) return
       n = cell%bodies%n

@@ -30,15 +30,20 @@ contains
       type(table_t), intent(inout) :: table
       !> Whether to take a long mean of the stress, which then has a tolerance of 1 instead of 3 %
       logical, intent(in) :: thorough
-      real(wp) :: coarse, fine
+      real(wp) :: coarse(4), fine(4), dt
+      integer :: k
 
       call table%begin('B26', 'sheared cell')
       call meet(table)
-      call shear(table, 1.0e-5_wp, 4500, coarse)
-      call shear(table, 0.5e-5_wp, 9000, fine)
-      call table%expect_absolute('elastic: energy that is missing, over the work of the border', 0.0_wp, fine, &
+      ! The error of a contact depends on the part of a step in which it begins, so some steps are tried.
+      do k = 1, size(fine)
+         dt = 1.0e-5_wp*(1.0_wp - 0.03_wp*real(k - 1, wp))
+         call shear(table, dt, 4500, coarse(k))
+         call shear(table, 0.5_wp*dt, 9000, fine(k))
+      end do
+      call table%expect_absolute('elastic: energy that is missing, over the work of the border', 0.0_wp, maxval(fine), &
                                  1.0e-2_wp)
-      call table%expect_least('elastic: its fall when dt is halved', 3.5_wp, coarse/fine)
+      call table%expect_least('elastic: its fall when dt is halved', 3.5_wp, norm2(coarse)/norm2(fine))
       call compare_stress(table, merge(0.01_wp, 0.03_wp, thorough))
    end subroutine run_sheared_cell
 

@@ -99,7 +99,7 @@ contains
 
       do k = 1, 2
          call begin_scene(block//'/ &forces local_damping = 0.5 damping = ''none'' friction = ''none'' '// &
-                          'stiffness = 1e5 gravity = 0, -1000 / &integrate duration = 0.1 dt = '// &
+                          'stiffness = 1e6 gravity = 0, -1000 / &integrate duration = 0.1 dt = '// &
                           to_text(2.0e-5_wp/real(k, wp), 17)//' /', simulation, error)
          if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
          call table%note_error(error)

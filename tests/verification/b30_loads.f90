@@ -235,7 +235,7 @@ contains
       type(error_t), allocatable :: error
       real(wp) :: missing(2), work
 
-      call find_missing_energy(biaxial(100, 'duration = 0.2 dt = 5e-6'), biaxial(100, 'duration = 0.2 dt = 2.5e-6'), &
+      call find_missing_energy(biaxial(100, 'duration = 0.2 dt = 4e-6'), biaxial(100, 'duration = 0.2 dt = 2e-6'), &
                                missing, work, error)
       call table%note_error(error)
       if (allocated(error)) return
