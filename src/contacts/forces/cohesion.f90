@@ -51,8 +51,9 @@ module polydem_cohesion
       procedure :: stiffen
    end type cohesion_t
 
-   !> Greatest tangent of half the angle at a crossing that the stable step allows for
-   real(wp), parameter :: steepest = 2.0_wp
+   !> Greatest tangent of half the angle at a crossing that the stable step allows for, with something for the turning of
+   !> the force with the bodies
+   real(wp), parameter :: steepest = 3.0_wp
 
 contains
 
