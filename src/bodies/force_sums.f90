@@ -1,8 +1,8 @@
 !> Sums of the contact forces on each body, separately for elastic, normal and tangential forces.
 !>
-!> The force of a contact acts at the centroid of the overlap. Torques are added: `lever` times the normal force, because
-!> its line of action may miss the centroid, that of cohesion for the same reason, and `twist`, the contact's own torque.
-!> The second body feels the opposite force and torques.
+!> The force of a contact acts at the centroid of the overlap. Torques are added: `lever` times the normal force,
+!> because its line of action may miss the centroid, that of cohesion for the same reason, and `twist`, the contact's
+!> own torque. The second body feels the opposite force and torques.
 !>
 !> Each body sums over its contacts in descending order of the partner's identifier. A loop over all contacts in
 !> descending order adds them in this order. So does every thread that runs over a range of contacts and keeps the

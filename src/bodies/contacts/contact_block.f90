@@ -4,8 +4,8 @@
 !> (`contacts_t`), but with the contact as first index, so that loops over contacts vectorise. In a block the *first*
 !> body of a contact is the one with the smaller radius; of equal radii it is the one with the lower identifier. These
 !> roles never change. A table has the body with the lower identifier first. Exchanging the bodies of a contact changes
-!> the signs of normal, direction, lever and twist, and of the forces, gradients and moments in `cohesion` and `of_area`,
-!> and nothing else.
+!> the signs of normal, direction, lever and twist, and of the forces, gradients and moments in `cohesion` and
+!> `of_area`, and nothing else.
 module polydem_contact_block
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t, is_degenerate
@@ -55,8 +55,8 @@ module polydem_contact_block
       real(wp) :: lever(block_size)
       !> Elastic repulsion of the overlap, a part of the normal force: not negative [N/m]
       real(wp) :: elastic(block_size)
-      !> Another force with a potential, which may attract: on the first body (x, y) [N/m], its torque about the centroid
-      !> of the overlap [N], and its energy [J/m]
+      !> Another force with a potential, which may attract: on the first body (x, y) [N/m], its torque about the
+      !> centroid of the overlap [N], and its energy [J/m]
       real(wp) :: cohesion(block_size, 4)
       !> Normal force, positive in repulsion: `elastic` and all other normal forces but `cohesion` [N/m]
       real(wp) :: normal_force(block_size)

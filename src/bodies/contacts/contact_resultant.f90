@@ -1,9 +1,9 @@
 !> Where the force of a contact acts.
 !>
 !> The law states a force at the centroid of the overlap, and a torque besides: the normal force times `lever`, that of
-!> cohesion, and `twist`. A normal force at another point of the line through the centroid, along the contact, has this torque alone.
-!> The tangential force acts along this line, so its moment is the same at each of its points. The point lies within
-!> both bodies. What torque is left, as where attraction and repulsion nearly cancel, is a couple.
+!> cohesion, and `twist`. A normal force at another point of the line through the centroid, along the contact, has this
+!> torque alone. The tangential force acts along this line, so its moment is the same at each of its points. The point
+!> lies within both bodies. What torque is left, as where attraction and repulsion nearly cancel, is a couple.
 module polydem_contact_resultant
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t

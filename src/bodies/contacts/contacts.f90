@@ -51,8 +51,8 @@ module polydem_contacts
       real(wp), allocatable :: length(:)
       !> Square of the length of the overlap; 0 if the measure does not contain it [m2]
       real(wp), allocatable :: length_square(:)
-      !> Gradient of the true area with respect to the first body (x, y) [m], its moment about the centroid, and the true
-      !> area [m2], (4, contact)
+      !> Gradient of the true area with respect to the first body (x, y) [m], its moment about the centroid, and the
+      !> true area [m2], (4, contact)
       real(wp), allocatable :: of_area(:, :)
       !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
       !> materials to that of the law if materials differ [1/m]
@@ -61,8 +61,8 @@ module polydem_contacts
       real(wp), allocatable :: lever(:)
       !> Elastic repulsion of the overlap, a part of the normal force: not negative [N/m]
       real(wp), allocatable :: elastic(:)
-      !> Another force with a potential, which may attract: on the first body (x, y) [N/m], its torque about the centroid
-      !> of the overlap [N], and its energy [J/m], (4, contact)
+      !> Another force with a potential, which may attract: on the first body (x, y) [N/m], its torque about the
+      !> centroid of the overlap [N], and its energy [J/m], (4, contact)
       real(wp), allocatable :: cohesion(:, :)
       !> Normal force, positive in repulsion: `elastic` and all other normal forces but `cohesion` [N/m]
       real(wp), allocatable :: normal_force(:)

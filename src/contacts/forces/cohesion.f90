@@ -1,10 +1,10 @@
 !> Cohesion: a traction c along the contact line, with the potential -c A of the true area A of the overlap.
 !>
-!> With the gradient N of the area and its moments M (`polydem_overlap_integrals`) the first body feels the force c N and
-!> the torque c M1, the second body the opposite. Where the outlines cross twice, this is the force of an even traction
-!> on the chord between the crossings: in proportion to its length, at its middle. So a flat face of the width w holds
-!> the load c w. The work on every closed path is zero with every law; the force changes continuously while features
-!> come and go, since the area has a continuous gradient unless whole edges coincide.
+!> With the gradient N of the area and its moments M (`polydem_overlap_integrals`) the first body feels the force c N
+!> and the torque c M1, the second body the opposite. Where the outlines cross twice, this is the force of an even
+!> traction on the chord between the crossings: in proportion to its length, at its middle. So a flat face of the width
+!> w holds the load c w. The work on every closed path is zero with every law; the force changes continuously while
+!> features come and go, since the area has a continuous gradient unless whole edges coincide.
 !>
 !> A tilt of a face about its middle does not change the area while both its corners stay inside. So cohesion has no
 !> stiffness against tilts, and a face under tension keeps that of the elastic law, whatever the load. With the polar
@@ -51,8 +51,8 @@ module polydem_cohesion
       procedure :: stiffen
    end type cohesion_t
 
-   !> Greatest tangent of half the angle at a crossing that the stable step allows for, with something for the turning of
-   !> the force with the bodies
+   !> Greatest tangent of half the angle at a crossing that the stable step allows for, with something for the turning
+   !> of the force with the bodies
    real(wp), parameter :: steepest = 3.0_wp
 
 contains

@@ -6,7 +6,8 @@
 !> to first order when a face tilts about its middle, so without this torque a body rocks on a face for very long. The
 !> contact of two corners has no length and rolls freely.
 !>
-!> The torque shifts the line of the normal force by at most L/2, because the corresponding pressures do not pull. A contact without pressure has no such torque.
+!> The torque shifts the line of the normal force by at most L/2, because the corresponding pressures do not pull. A
+!> contact without pressure has no such torque.
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
