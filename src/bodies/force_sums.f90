@@ -1,8 +1,8 @@
 !> Sums of the contact forces on each body, separately for elastic, normal and tangential forces.
 !>
-!> The force of a contact acts at the centroid of the overlap. Two torques are added: `lever` times the normal force,
-!> because its line of action may miss the centroid, and `twist`, the contact's own torque. The second body feels the
-!> opposite force and torques.
+!> The force of a contact acts at the centroid of the overlap. Torques are added: `lever` times the normal force,
+!> because its line of action may miss the centroid, that of cohesion for the same reason, and `twist`, the contact's
+!> own torque. The second body feels the opposite force and torques.
 !>
 !> Each body sums over its contacts in descending order of the partner's identifier. A loop over all contacts in
 !> descending order adds them in this order. So does every thread that runs over a range of contacts and keeps the
@@ -119,14 +119,14 @@ contains
       !> Contacts with their forces
       type(contact_block_t), intent(in) :: block
       type(contact_terms_t), intent(inout) :: terms
-      real(wp) :: elastic, normal, tangential, x, y, lever_first, lever_second
+      real(wp) :: elastic, normal, tangential, x, y, lever_first, lever_second, torque
       integer(ip) :: c
 
       associate (first => terms%first, second => terms%second)
          do c = 1_ip, block%n
             x = block%direction(c, 1)
             y = block%direction(c, 2)
-            elastic = block%elastic(c) + block%cohesion(c)
+            elastic = block%elastic(c)
             normal = block%normal_force(c)
             tangential = block%tangential_force(c)
             lever_first = (block%arm_first(c, 1)*y - block%arm_first(c, 2)*x) + block%lever(c)
@@ -148,9 +148,24 @@ contains
          end do
       end associate
       if (.not. block%has_cohesion) return
-      terms%first(10, :block%n) = 0.5_wp*contact_energy(block%elastic(:block%n), block%area(:block%n), &
-                                                        block%length(:block%n), block%cohesion(:block%n))
-      terms%second(10, :block%n) = terms%first(10, :block%n)
+      associate (first => terms%first, second => terms%second)
+         do c = 1_ip, block%n
+            x = block%cohesion(c, 1)
+            y = block%cohesion(c, 2)
+            first(1, c) = first(1, c) + x
+            first(2, c) = first(2, c) + y
+            first(3, c) = first(3, c) + x
+            first(4, c) = first(4, c) + y
+            torque = (block%arm_first(c, 1)*y - block%arm_first(c, 2)*x) + block%cohesion(c, 3)
+            first(7, c) = first(7, c) + torque
+            first(8, c) = first(8, c) + torque
+            torque = (block%arm_second(c, 1)*y - block%arm_second(c, 2)*x) + block%cohesion(c, 3)
+            second(7, c) = second(7, c) - torque
+            second(8, c) = second(8, c) - torque
+            first(10, c) = first(10, c) + 0.5_wp*block%cohesion(c, 4)
+            second(10, c) = first(10, c)
+         end do
+      end associate
    end subroutine terms_of_block
 
    !> Energy of a contact of a table [J/m]
@@ -159,22 +174,16 @@ contains
       !> Index of the contact
       integer(ip), intent(in) :: c
 
-      if (contacts%has_cohesion) then
-         energy = contact_energy(contacts%elastic(c), contacts%area(c), contacts%length(c), contacts%cohesion(c))
-      else
-         energy = contact_energy(contacts%elastic(c), contacts%area(c), contacts%length(c))
-      end if
+      energy = contact_energy(contacts%elastic(c), contacts%area(c), contacts%length(c))
+      if (contacts%has_cohesion) energy = energy + contacts%cohesion(4, c)
    end function energy_of_contact
 
-   !> Energy of a contact [J/m]: exact for laws whose contacts have one, else an estimate
-   elemental real(wp) function contact_energy(elastic, area, length, cohesion) result(energy)
+   !> Elastic energy of a contact [J/m]: exact for laws whose contacts have one, else an estimate
+   elemental real(wp) function contact_energy(elastic, area, length) result(energy)
       !> Elastic repulsion [N/m], area [m2] and length [m] of the contact
       real(wp), intent(in) :: elastic, area, length
-      !> Cohesive force, if there is cohesion [N/m]
-      real(wp), intent(in), optional :: cohesion
 
       energy = 0.5_wp*elastic*area/length
-      if (present(cohesion)) energy = energy + cohesion*area/length
    end function contact_energy
 
    !> Term of one body of a contact. The energy of a contact is divided between its two bodies.

@@ -52,6 +52,7 @@ contains
       overlap%normal = -overlap%normal
       overlap%moment_a = -overlap%moment_a
       overlap%moment_b = -overlap%moment_b
+      overlap%of_area(:3) = -overlap%of_area(:3)
       if (.not. radius_p < radius_q) then
          call clip(q, p, -offset, radius_q, measure, other)
          overlap = mean(overlap, other, offset)
@@ -79,6 +80,7 @@ contains
       mean%moment_a = 0.5_wp*(forward%moment_a + back%moment_b)
       mean%moment_b = 0.5_wp*(forward%moment_b + back%moment_a)
       mean%length_square = 0.5_wp*(forward%length_square + back%length_square)
+      mean%of_area = 0.5_wp*(forward%of_area + back%of_area)
    end function mean
 
    !> First edge of one polygon that separates it from another, 0 if there is none
@@ -198,6 +200,9 @@ contains
       call cut_all(subject, clipper, offset, scale, corners, vertex, on_clipper, work, n, now)
       if (n == 0_ip) return
       call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
+      if (by%with_area) overlap%of_area = [overlap%normal, overlap%moment_a - (overlap%centroid(1)*overlap%normal(2) &
+                                                                            - overlap%centroid(2)*overlap%normal(1)), &
+                                           overlap%area]
       if (.not. (by%has_moments .and. overlap%area > 0.0_wp)) return
       call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, by, vertex(:, :, 3_ip - now), &
                           overlap)

@@ -88,6 +88,7 @@ contains
       overlap%moment_a = columns%moment(1, 1)
       overlap%moment_b = columns%moment(1, 2)
       overlap%length_square = columns%length_square(1)
+      if (measure%with_area) overlap%of_area = columns%of_area(1, :)
    end subroutine evaluate_lens
 
    !> Overlap of two convex polygons in any order.
@@ -115,6 +116,7 @@ contains
          overlap = overlap_t(area=overlap%area, centroid=overlap%centroid_b, centroid_b=overlap%centroid, &
                              normal=-overlap%normal, moment_a=-overlap%moment_b, moment_b=-overlap%moment_a, &
                              length_square=overlap%length_square, &
+                             of_area=[-overlap%of_area(:3), overlap%of_area(4)], &
                              separating_edge=-overlap%separating_edge)
       end if
    end subroutine overlap_polygons

@@ -21,15 +21,17 @@ module polydem_lens_area
 contains
 
    !> Area, its gradient, moments and centroid of all lenses.
-   pure subroutine integrate_area(n, lens, columns)
+   pure subroutine integrate_area(n, with_area, lens, columns)
       !> Number of lanes
       integer(ip), intent(in) :: n
+      !> Whether the area is needed besides, with the moment about the centroid
+      logical, intent(in) :: with_area
       !> The batch with crossings
       type(lens_work_t), intent(inout) :: lens
       !> Overlaps of these lanes
       type(overlap_columns_t), intent(inout) :: columns
       type(arcs_t) :: arcs
-      real(wp) :: zx, zy, mx, my, twice, wx, wy, scale
+      real(wp) :: zx, zy, mx, my, twice, wx, wy, scale, about_centroid(column_length)
       integer(ip) :: i
 
       call find_arcs(n, lens, arcs)
@@ -44,6 +46,7 @@ contains
          scale = 1.0_wp/max(twice, sure_area*lens%radius(i, 1)*lens%radius(i, 1))
          wx = mx + scale*(0.5_wp*(arcs%area(i, 2) - arcs%area(i, 1))*zx + third*wx)
          wy = my + scale*(0.5_wp*(arcs%area(i, 2) - arcs%area(i, 1))*zy + third*wy)
+         about_centroid(i) = -(zx*(mx - wx) + zy*(my - wy))
          columns%area(i) = 0.5_wp*twice
          columns%arm_first(i, 1) = wx - lens%centre(i, 1)
          columns%arm_first(i, 2) = wy - lens%centre(i, 2)
@@ -59,6 +62,10 @@ contains
                                   min(columns%area(i) - sure_area*lens%radius(i, 1)*lens%radius(i, 1), &
                                       zx*zx + zy*zy - 4.0_wp*no_length**2*columns%area(i)))
       end do
+      if (.not. with_area) return
+      columns%of_area(:n, 1:2) = columns%normal(:n, :)
+      columns%of_area(:n, 3) = about_centroid(:n)
+      columns%of_area(:n, 4) = columns%area(:n)
    end subroutine integrate_area
 
    !> Integrate over both arcs with the chord, each as a fan from its first crossing.

@@ -77,6 +77,7 @@ contains
       call find_second_moments(n, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
       call find_parts_of_weight(n, measure, work, columns)
       call weigh(n, measure%share_effective, work, lens, columns)
+      if (measure%with_area) call keep_area(n, work, columns)
    end subroutine integrate_effective_area
 
    !> Find the coordinates of the corners along and across the chord.
@@ -288,6 +289,21 @@ contains
          lens%certified(i) = min(lens%certified(i), worst)
       end do
    end subroutine weigh
+
+   !> Keep the true area and its gradient, the chord turned by a right angle through the middle of the chord.
+   pure subroutine keep_area(n, work, columns)
+      integer(ip), intent(in) :: n
+      type(work_t), intent(in) :: work
+      type(overlap_columns_t), intent(inout) :: columns
+      integer(ip) :: i
+
+      do i = 1_ip, n
+         columns%of_area(i, 1) = work%chord(i, 2)
+         columns%of_area(i, 2) = -work%chord(i, 1)
+         columns%of_area(i, 3) = work%square(i)*work%centroid(i, 1)
+         columns%of_area(i, 4) = 0.5_wp*work%unit_area(i)*(work%fan(i, 1, 1) + work%fan(i, 1, 2))
+      end do
+   end subroutine keep_area
 
    !> Positive if chord, area, contact length and moments of a lens are beyond their rounding errors
    pure real(wp) function certificate(square, area, length, measured, determinant, product, radius)

@@ -66,7 +66,7 @@ contains
       if (measure%has_moments) then
          call integrate_effective_area(n, measure, lens, columns)
       else
-         call integrate_area(n, lens, columns)
+         call integrate_area(n, measure%with_area, lens, columns)
       end if
       batch%certified(:n) = lens%certified(:n)
    end subroutine evaluate_batch

@@ -30,6 +30,9 @@ module polydem_overlap_batch
       real(wp) :: length(lanes)
       !> Square L^2 of the length of the overlap; 0 if the measure does not contain it [m2]
       real(wp) :: length_square(lanes)
+      !> Gradient of the true area, (lane, x or y) [m], its moment about the centroid, and the true area [m2]; set only
+      !> if the measure asks for it
+      real(wp) :: of_area(lanes, 4)
    end type overlap_columns_t
 
    !> A batch of pairs, one lane each. Its numbers are not initialised. Last indices (2) are P and Q.

@@ -33,6 +33,9 @@ module polydem_overlap_integrals
       real(wp) :: moment_b = 0.0_wp
       !> Square L^2 of the length of the overlap; 0 if the measure does not contain it [m2]
       real(wp) :: length_square = 0.0_wp
+      !> If the measure asks for it, the gradient of the true area (x, y) [m], its moment about the centroid, and the
+      !> true area [m2]
+      real(wp) :: of_area(4) = 0.0_wp
       !> Edge whose line separates the polygons: +k of a, -k of b; 0 if none is known or they overlap
       integer(ip) :: separating_edge = 0_ip
    end type overlap_t

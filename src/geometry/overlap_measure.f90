@@ -31,6 +31,8 @@ module polydem_overlap_measure
       real(wp) :: share_effective = 0.0_wp
       !> Power s of the length by which B is divided, 0, 1/2 or 1
       real(wp) :: power = 0.0_wp
+      !> Whether the gradient of the true area is needed besides
+      logical :: with_area = .false.
    contains
       procedure :: joins
    end type overlap_measure_t

@@ -27,7 +27,7 @@ module remembered_overlap
 
 contains
 
-   !> Every measure of overlaps in turn
+   !> Every measure of overlaps in turn, with the gradient of the true area
    pure type(overlap_measure_t) function measure_of(k)
       integer, intent(in) :: k
       type(overlap_measure_t), parameter :: all_measures(0:4) = [ &
@@ -36,6 +36,7 @@ contains
          overlap_measure_t(.true., 1.0_wp, 1.0_wp)]
 
       measure_of = all_measures(modulo(k, size(all_measures)))
+      measure_of%with_area = .true.
    end function measure_of
 
    !> Overlap of a pair from what is remembered; `features` becomes what the next step remembers, as in `fill_block`
@@ -123,6 +124,7 @@ contains
       overlap%moment_a = columns%moment(1, 1)
       overlap%moment_b = columns%moment(1, 2)
       overlap%length_square = columns%length_square(1)
+      if (measure%with_area) overlap%of_area = columns%of_area(1, :)
    end subroutine certified_lens
 
    !> Whether two overlaps are equal
@@ -138,10 +140,10 @@ contains
    !> All numbers of an overlap
    pure function numbers(overlap)
       type(overlap_t), intent(in) :: overlap
-      real(wp) :: numbers(10)
+      real(wp) :: numbers(14)
 
       numbers = [overlap%area, overlap%centroid, overlap%centroid_b, overlap%normal, overlap%moment_a, &
-                 overlap%moment_b, overlap%length_square]
+                 overlap%moment_b, overlap%length_square, overlap%of_area]
    end function numbers
 
    !> Greatest distance of a vertex from the centre

@@ -4,7 +4,8 @@
 !> (`contacts_t`), but with the contact as first index, so that loops over contacts vectorise. In a block the *first*
 !> body of a contact is the one with the smaller radius; of equal radii it is the one with the lower identifier. These
 !> roles never change. A table has the body with the lower identifier first. Exchanging the bodies of a contact changes
-!> the signs of normal, direction, lever and twist, and nothing else.
+!> the signs of normal, direction, lever and twist, and of the forces, gradients and moments in `cohesion` and
+!> `of_area`, and nothing else.
 module polydem_contact_block
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t, is_degenerate
@@ -23,7 +24,7 @@ module polydem_contact_block
    type, extends(overlap_columns_t) :: contact_block_t
       !> Number of contacts
       integer(ip) :: n = 0_ip
-      !> Whether the column `cohesion` is not zero
+      !> Whether there is cohesion; otherwise `of_area` and `cohesion` are not set
       logical :: has_cohesion = .false.
       !> Index in the pair list
       integer(ip) :: pair(block_size) = 0_ip
@@ -56,9 +57,10 @@ module polydem_contact_block
       real(wp) :: lever(block_size)
       !> Elastic repulsion of the overlap, a part of the normal force: not negative [N/m]
       real(wp) :: elastic(block_size)
-      !> Part of the normal force whose work is elastic, too, but which may attract: negative in attraction [N/m]
-      real(wp) :: cohesion(block_size)
-      !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
+      !> Another force with a potential, which may attract: on the first body (x, y) [N/m], its torque about the
+      !> centroid of the overlap [N], and its energy [J/m]
+      real(wp) :: cohesion(block_size, 4)
+      !> Normal force, positive in repulsion: `elastic` and all other normal forces but `cohesion` [N/m]
       real(wp) :: normal_force(block_size)
       !> Of one of several contacts between the same two bodies, where fixed bodies count as one: its normal damping
       !> force [N/m] and its dashpot [N s/m2], both over 2 zeta; 0 for a contact alone. Set only if the force law needs
@@ -119,7 +121,7 @@ contains
       !> First contact to copy; those before it follow in descending order, up to `block_size` contacts
       integer(ip), intent(in) :: high
       type(contact_block_t), intent(inout) :: block
-      real(wp) :: side
+      real(wp) :: side, sides(4)
       integer(ip) :: b, c
       logical :: exchanged
 
@@ -148,8 +150,11 @@ contains
          block%elastic(b) = contacts%elastic(c)
          block%normal_force(b) = contacts%normal_force(c)
          block%tangential_force(b) = contacts%tangential_force(c)
-         block%cohesion(b) = 0.0_wp
-         if (contacts%has_cohesion) block%cohesion(b) = contacts%cohesion(c)
+         if (contacts%has_cohesion) then
+            sides = [side, side, side, 1.0_wp]
+            block%of_area(b, :) = sides*contacts%of_area(:, c)
+            block%cohesion(b, :) = sides*contacts%cohesion(:, c)
+         end if
          block%twist(b) = 0.0_wp
          if (contacts%has_twist) block%twist(b) = side*contacts%twist(c)
       end do
@@ -172,7 +177,7 @@ contains
       contacts%elastic(c) = block%elastic(b)
       contacts%normal_force(c) = block%normal_force(b)
       contacts%tangential_force(c) = block%tangential_force(b)
-      if (contacts%has_cohesion) contacts%cohesion(c) = block%cohesion(b)
+      if (contacts%has_cohesion) contacts%cohesion(:, c) = [side, side, side, 1.0_wp]*block%cohesion(b, :)
       if (contacts%has_twist) contacts%twist(c) = side*block%twist(b)
    end subroutine store_forces
 
@@ -202,6 +207,7 @@ contains
       contacts%length(c) = block%length(b)
       contacts%length_square(c) = block%length_square(b)
       contacts%depth(c) = block%depth(b)
+      if (contacts%has_cohesion) contacts%of_area(:, c) = [side, side, side, 1.0_wp]*block%of_area(b, :)
    end subroutine store_contact
 
 end module polydem_contact_block

@@ -1,9 +1,9 @@
 !> Where the force of a contact acts.
 !>
-!> The law states a force at the centroid of the overlap, and a torque besides: the normal force times `lever`, and
-!> `twist`. A normal force at another point of the line through the centroid, along the contact, has this torque alone.
-!> The tangential force acts along this line, so its moment is the same at each of its points. The point lies within
-!> both bodies. What torque is left, as where attraction and repulsion nearly cancel, is a couple.
+!> The law states a force at the centroid of the overlap, and a torque besides: the normal force times `lever`, that of
+!> cohesion, and `twist`. A normal force at another point of the line through the centroid, along the contact, has this
+!> torque alone. The tangential force acts along this line, so its moment is the same at each of its points. The point
+!> lies within both bodies. What torque is left, as where attraction and repulsion nearly cancel, is a couple.
 module polydem_contact_resultant
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
@@ -26,22 +26,27 @@ contains
       real(wp), intent(out) :: shift(2)
       !> What is left of the torque [N]
       real(wp), intent(out) :: couple
-      real(wp) :: along(2), line(2), place
+      real(wp) :: along(2), line(2), place, across
 
       shift = 0.0_wp
-      couple = contacts%normal_force(c)*contacts%lever(c)
+      across = contacts%normal_force(c)
+      couple = across*contacts%lever(c)
+      if (contacts%has_cohesion) then
+         across = across + inner_product(contacts%cohesion(:2, c), contacts%direction(:, c))
+         couple = couple + contacts%cohesion(3, c)
+      end if
       if (contacts%has_twist) couple = couple + contacts%twist(c)
-      if (.not. abs(couple) > 0.0_wp .or. .not. abs(contacts%normal_force(c)) > 0.0_wp) return
+      if (.not. abs(couple) > 0.0_wp .or. .not. abs(across) > 0.0_wp) return
       along = [-contacts%direction(2, c), contacts%direction(1, c)]
       line = [-huge(1.0_wp), huge(1.0_wp)]
       call shorten(bodies, contacts%first(c), contacts%arm_first(:, c), along, line)
       call shorten(bodies, contacts%second(c), contacts%arm_second(:, c), along, line)
-      place = -couple/contacts%normal_force(c)
+      place = -couple/across
       if (place >= line(1) .and. place <= line(2)) then
          couple = 0.0_wp
       else
          place = max(line(1), min(line(2), place))
-         couple = couple + place*contacts%normal_force(c)
+         couple = couple + place*across
       end if
       shift = place*along
    end subroutine find_resultant

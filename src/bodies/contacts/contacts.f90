@@ -1,8 +1,8 @@
 !> Contacts: pairs of bodies whose polygons overlap.
 !>
 !> Contacts are in ascending order of their pairs: of the first body, then of the second. The first body has the lower
-!> identifier. All vectors are in world coordinates. `cohesion` and `twist` are allocated only if a force part of
-!> the run needs them.
+!> identifier. All vectors are in world coordinates. `of_area`, `cohesion` and `twist` are allocated only if a
+!> force part of the run needs them.
 module polydem_contacts
    use polydem_grow, only: grow
    use polydem_kinds, only: ip, wp
@@ -17,12 +17,12 @@ module polydem_contacts
       integer(ip) :: n = 0_ip
       !> Number of degenerate contacts, which have no direction (one body inside the other, or crossing bars)
       integer(ip) :: n_degenerate = 0_ip
-      !> Whether the elastic force has an energy, elastic*area/(2 length), and cohesion has cohesion*area/length
+      !> Whether the elastic force has an energy, elastic*area/(2 length), and cohesion states its own
       logical :: energy_is_known = .false.
       !> How overlaps are measured: `area` and the columns derived from it (`rate`, `normal`, `moment`, `direction`,
       !> `length`) are those of this measure
       type(overlap_measure_t) :: measure
-      !> Whether a force part needs the column `cohesion`
+      !> Whether a force part needs the columns `of_area` and `cohesion`
       logical :: has_cohesion = .false.
       !> Whether a force part needs the column `twist`
       logical :: has_twist = .false.
@@ -53,6 +53,9 @@ module polydem_contacts
       real(wp), allocatable :: length_square(:)
       !> Depth of the overlap: area over length, of contacts that are joined that of all [m]
       real(wp), allocatable :: depth(:)
+      !> Gradient of the true area with respect to the first body (x, y) [m], its moment about the centroid, and the
+      !> true area [m2], (4, contact)
+      real(wp), allocatable :: of_area(:, :)
       !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
       !> materials to that of the law if materials differ [1/m]
       real(wp), allocatable :: inverse_length(:)
@@ -60,9 +63,10 @@ module polydem_contacts
       real(wp), allocatable :: lever(:)
       !> Elastic repulsion of the overlap, a part of the normal force: not negative [N/m]
       real(wp), allocatable :: elastic(:)
-      !> Part of the normal force whose work is elastic, too, but which may attract: negative in attraction [N/m]
-      real(wp), allocatable :: cohesion(:)
-      !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
+      !> Another force with a potential, which may attract: on the first body (x, y) [N/m], its torque about the
+      !> centroid of the overlap [N], and its energy [J/m], (4, contact)
+      real(wp), allocatable :: cohesion(:, :)
+      !> Normal force, positive in repulsion: `elastic` and all other normal forces but `cohesion` [N/m]
       real(wp), allocatable :: normal_force(:)
       !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
       real(wp), allocatable :: tangential_force(:)
@@ -127,7 +131,11 @@ contains
       call grow(contacts%inverse_length, kept, m, 0.0_wp)
       call grow(contacts%lever, kept, m, 0.0_wp)
       call grow(contacts%elastic, kept, m, 0.0_wp)
-      if (contacts%has_cohesion) call grow(contacts%cohesion, kept, m, 0.0_wp)
+      if (contacts%has_cohesion) then
+         if (.not. allocated(contacts%cohesion)) allocate (contacts%of_area(4, 0), contacts%cohesion(4, 0))
+         call grow(contacts%of_area, kept, m, 0.0_wp)
+         call grow(contacts%cohesion, kept, m, 0.0_wp)
+      end if
       call grow(contacts%normal_force, kept, m, 0.0_wp)
       call grow(contacts%tangential_force, kept, m, 0.0_wp)
       if (contacts%has_twist) call grow(contacts%twist, kept, m, 0.0_wp)
@@ -160,7 +168,8 @@ contains
       to%inverse_length(d) = from%inverse_length(c)
       to%lever(d) = from%lever(c)
       to%elastic(d) = from%elastic(c)
-      if (to%has_cohesion) to%cohesion(d) = from%cohesion(c)
+      if (to%has_cohesion) to%of_area(:, d) = from%of_area(:, c)
+      if (to%has_cohesion) to%cohesion(:, d) = from%cohesion(:, c)
       to%normal_force(d) = from%normal_force(c)
       to%tangential_force(d) = from%tangential_force(c)
       if (to%has_twist) to%twist(d) = from%twist(c)
@@ -177,6 +186,7 @@ contains
          - contacts%tangential_force(c)*contacts%direction(2, c)
       force(2) = contacts%normal_force(c)*contacts%direction(2, c) &
          + contacts%tangential_force(c)*contacts%direction(1, c)
+      if (contacts%has_cohesion) force = force + contacts%cohesion(:2, c)
    end function contact_force
 
 end module polydem_contacts

@@ -82,8 +82,8 @@ contains
       type(contact_history_t), intent(inout) :: history
       real(wp) :: load(block_size)
 
-      if (block%has_cohesion .or. allocated(self%coefficient%factor)) then
-         load(:block%n) = block%normal_force(:block%n) - block%cohesion(:block%n)
+      if (allocated(self%coefficient%factor)) then
+         load(:block%n) = block%normal_force(:block%n)
          call self%coefficient%scale(block%n, block%material, load)
          call add_limited(self, bodies, dt, load, block, history)
       else

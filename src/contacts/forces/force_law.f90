@@ -43,7 +43,7 @@ module polydem_force_law
       logical :: needs_shares = .false.
       !> Whether a part needs the accelerations of the last step
       logical :: needs_accelerations = .false.
-      !> Whether the energy of all elastic forces is known: half of elastic area/length, and cohesion area/length
+      !> Whether the energy of all elastic forces is known: half of elastic area/length, and that of cohesion
       logical :: energy_is_known = .false.
       !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
@@ -142,10 +142,10 @@ contains
       do k = 1, size(law%parts)
          law%parts(k)%part%friction_column = column_of_friction(law%history_kinds)
          associate (part => law%parts(k)%part)
-            if (part%needs_cohesion .and. (.not. part%cohesion_has_energy .or. law%overlap_measure%power > 0.0_wp)) &
-               law%energy_is_known = .false.
+            if (part%needs_cohesion .and. .not. part%cohesion_has_energy) law%energy_is_known = .false.
          end associate
       end do
+      law%overlap_measure%with_area = law%needs_cohesion
       law%description = trim(adjustl(law%description))
    end subroutine collect_needs
 
@@ -216,7 +216,7 @@ contains
       block%has_cohesion = law%needs_cohesion
       associate (n => block%n)
          block%elastic(:n) = 0.0_wp
-         block%cohesion(:n) = 0.0_wp
+         if (law%needs_cohesion) block%cohesion(:n, :) = 0.0_wp
          block%normal_force(:n) = 0.0_wp
          block%tangential_force(:n) = 0.0_wp
          block%twist(:n) = 0.0_wp

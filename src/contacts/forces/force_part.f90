@@ -4,7 +4,7 @@
 !> parts. The columns decide the channel of the energy balance:
 !>
 !> * `elastic` and `normal_force`: repulsion of the overlap, work of elastic forces;
-!> * `cohesion` and `normal_force`: another force with a potential, which may attract, also work of elastic forces;
+!> * `cohesion`: another force with a potential, which may attract, also work of elastic forces;
 !> * `normal_force` alone: work of damping;
 !> * `twist`: torque of the contact itself, work of damping;
 !> * `tangential_force`: work of tangential forces.
@@ -24,8 +24,8 @@ module polydem_force_part
    public :: force_part_t, resting_block_t, stage_elastic, stage_damping, stage_on_damping, stage_normal, stage_last
 
    !> Stages in the order in which they act: elastic repulsion, which sets `inverse_length` and `lever`; normal damping,
-   !> which uses the repulsion only; changes of the damping; other normal forces, such as cohesion; friction and damping
-   !> of tilts, which use the whole normal force
+   !> which uses the repulsion only; changes of the damping; other forces, such as cohesion; friction and damping of
+   !> tilts, which use the whole normal force
    integer, parameter :: stage_elastic = 1, stage_damping = 2, stage_on_damping = 3, stage_normal = 4, stage_last = 5
 
    !> A rectangular block at rest on a support
@@ -48,7 +48,7 @@ module polydem_force_part
       integer :: stage = stage_normal
       !> How overlaps must be measured; that of the elastic part counts
       type(overlap_measure_t) :: overlap_measure
-      !> Whether it adds to the column `cohesion`, and whether the energy of this attraction is cohesion*area/length
+      !> Whether it adds to the column `cohesion`, and whether it states the energy there
       logical :: needs_cohesion = .false., cohesion_has_energy = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.

@@ -121,7 +121,6 @@ contains
       do c = 1_ip, block%n
          limit(c) = block%normal_force(c)
       end do
-      if (block%has_cohesion) limit(:block%n) = limit(:block%n) - block%cohesion(:block%n)
       do c = 1_ip, block%n
          associate (radius => 1.0_wp/(self%curvature(block%first(c)) + self%curvature(block%second(c))))
             limit(c) = self%coefficient%one*radius*max(0.0_wp, limit(c))

@@ -233,7 +233,6 @@ contains
       element%ratio = element%length*element%inverse_length
       element%elastic = contacts%elastic(c)
       element%repulsion = contacts%normal_force(c)
-      if (contacts%has_cohesion) element%repulsion = element%repulsion - contacts%cohesion(c)
       element%normal_mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
       element%normal_mass = 1.0_wp/element%normal_mobility
       element%tangential_mass = 1.0_wp/alone(2)

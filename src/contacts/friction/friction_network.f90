@@ -111,7 +111,6 @@ contains
       end associate
       network%inverse_mobility(c) = 1.0_wp/network%mobility(c)
       pressure = contacts%normal_force(c)
-      if (contacts%has_cohesion) pressure = pressure - contacts%cohesion(c)
       network%limit(c) = merge(0.0_wp, coefficient*max(0.0_wp, pressure), is_degenerate(contacts, c))
       network%noise(c) = rounding*network%mobility(c)*abs(pressure)
    end subroutine fill_contact

@@ -218,7 +218,7 @@ contains
       end do
       if (all(exists(:block%n))) return
       if (bodies%pieces%most > 1_ip) call keep_pieces(exists, block)
-      call remove_others(exists, block)
+      call remove_others(exists, measure%with_area, block)
    end subroutine search_others
 
    !> Search the overlap of one pair. What is remembered is no separating edge, and no lens that is certified.
@@ -264,6 +264,7 @@ contains
       block%normal(c, :) = overlap%normal
       block%length(c) = length_of(overlap%normal(1), overlap%normal(2))
       block%length_square(c) = overlap%length_square
+      block%of_area(c, :) = overlap%of_area
       block%moment(c, :) = [overlap%moment_a, overlap%moment_b]
       block%arm_first(c, :) = overlap%centroid
       block%arm_second(c, :) = overlap%centroid_b
@@ -271,8 +272,10 @@ contains
    end subroutine search
 
    !> Remove the pairs that are no contacts.
-   pure subroutine remove_others(exists, block)
+   pure subroutine remove_others(exists, with_area, block)
       logical, intent(in) :: exists(block_size)
+      !> Whether the measure asks for the true area
+      logical, intent(in) :: with_area
       type(contact_block_t), intent(inout) :: block
       integer(ip) :: b, c
 
@@ -292,6 +295,7 @@ contains
          block%arm_first(b, :) = block%arm_first(c, :)
          block%arm_second(b, :) = block%arm_second(c, :)
          block%degenerate(b) = block%degenerate(c)
+         if (with_area) block%of_area(b, :) = block%of_area(c, :)
       end do
       block%n = b
    end subroutine remove_others

@@ -76,6 +76,7 @@ contains
       block%piece(c, :) = block%piece(c, [2, 1])
       block%normal(c, :) = -block%normal(c, :)
       block%moment(c, :) = -block%moment(c, [2, 1])
+      block%of_area(c, :3) = -block%of_area(c, :3)
       arm = block%arm_first(c, :)
       block%arm_first(c, :) = block%arm_second(c, :)
       block%arm_second(c, :) = arm

@@ -56,8 +56,7 @@ contains
       associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
       do c = 1_ip, block%n
-         block%cohesion(c) = block%cohesion(c) - self%pull
-         block%normal_force(c) = block%normal_force(c) - self%pull
+         block%cohesion(c, :2) = block%cohesion(c, :2) - self%pull*block%direction(c, :)
       end do
    end subroutine add_cohesion
 

@@ -6,11 +6,11 @@
 !> to first order when a face tilts about its middle, so without this torque a body rocks on a face for very long. The
 !> contact of two corners has no length and rolls freely.
 !>
-!> The torque shifts the line of the normal force without cohesion by at most L/2, because the corresponding pressures
-!> do not pull. A contact without pressure has no such torque.
+!> The torque shifts the line of the normal force by at most L/2, because the corresponding pressures do not pull. A
+!> contact without pressure has no such torque.
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_block, only: contact_block_t
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_last
@@ -55,34 +55,18 @@ contains
       !> Contacts with their dashpots; `twist` changes
       type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
-      real(wp) :: load(block_size)
-
-      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
-      end associate
-      if (block%has_cohesion) then
-         load(:block%n) = block%normal_force(:block%n) - block%cohesion(:block%n)
-         call add_limited(self%share, load, block)
-      else
-         call add_limited(self%share, block%normal_force, block)
-      end if
-   end subroutine add
-
-   !> Add the torque for given loads.
-   pure subroutine add_limited(share, load, block)
-      real(wp), intent(in) :: share
-      !> Normal force of each contact without cohesion [N/m]
-      real(wp), intent(in) :: load(block_size)
-      type(contact_block_t), intent(inout) :: block
       real(wp) :: limit, torque
       integer(ip) :: c
 
+      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
+      end associate
       do c = 1_ip, block%n
-         torque = -(share/12.0_wp)*block%dashpot(c)*block%length(c)**2 &
+         torque = -(self%share/12.0_wp)*block%dashpot(c)*block%length(c)**2 &
             *(block%angular_velocity(c, 1) - block%angular_velocity(c, 2))
-         limit = 0.5_wp*block%length(c)*max(0.0_wp, load(c))
+         limit = 0.5_wp*block%length(c)*max(0.0_wp, block%normal_force(c))
          block%twist(c) = block%twist(c) + max(-limit, min(limit, torque))
       end do
-   end subroutine add_limited
+   end subroutine add
 
    !> Add the dashpot against tilts.
    subroutine stiffen(self, element)
