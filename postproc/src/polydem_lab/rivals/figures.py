@@ -63,9 +63,9 @@ def error_against_time(found: Comparison, problem: str) -> Drawing:
 
 def summary(found: Comparison) -> Drawing:
     """Error against time of all problems in small panels."""
-    columns = min(4, len(found.problems))
+    columns = min(4, max(2, len(found.problems)))
     rows = math.ceil(len(found.problems) / columns)
-    figure, grid, below = grid_with_legend(rows, columns, 3.0, 2.4, 5)
+    figure, grid, below = grid_with_legend(rows, columns, 3.0, 2.4, 20 // columns)
     axes = [axis for row in grid for axis in row]
     for axis, problem in zip(axes, found.problems):
         _draw(axis, found, problem)
@@ -75,7 +75,7 @@ def summary(found: Comparison) -> Drawing:
     for k, axis in enumerate(axes[: len(found.problems)]):
         axis.set_xlabel("s per simulated s" if k >= len(found.problems) - columns else "")
         axis.set_ylabel("error" if k % columns == 0 else "")
-    shared_legend(below, axes, columns=4)
+    shared_legend(below, axes, columns=columns)
     return Drawing("rivals_all", figure, "Error against processor time per simulated second, all problems and codes.")
 
 

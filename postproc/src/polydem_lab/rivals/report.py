@@ -7,15 +7,17 @@ from pathlib import Path
 
 from polydem_post.base.result_file import cannot_write
 
+from ..report.files import ORIGIN as REVISION
 from ..report.files import write_figures, write_tables
 from .points import Comparison, read_comparison
 from .tables import all_tables
 
-#: Tables that stand on the page itself
-NOT_ON_THE_PAGE = ("rivals_points",)
+#: Tables that are too long for the page
+NOT_ON_THE_PAGE = ("rivals_points", "rivals_seeds")
 
-#: Name of the page in a report, and of the one that is published
+#: Name of the page in a report, and of the one that is published; the figures that are
 PAGE, PUBLISHED = "rivals.md", "tables.md"
+PUBLISHED_FIGURES = ("rivals_all", "rivals_profile", "rivals_collective", "rivals_requested")
 
 
 def write_rivals_report(folder: Path, figures: bool = True) -> list[Path]:
@@ -44,14 +46,15 @@ def origin_of(found: Comparison) -> str:
 
 
 def publish(folder: Path, place: Path) -> Path:
-    """Copy page, tables (CSV) and figures (PNG) of a report to where the manual shows them; the page."""
+    """Copy page, tables (CSV) and some figures (PNG) of a report to where the manual shows them; the page."""
     report = Path(folder) / "report"
     try:
-        for name, suffix in (("tables", "csv"), ("figures", "png")):
-            target = place / "tables" if name == "tables" else place
-            target.mkdir(parents=True, exist_ok=True)
-            for path in sorted((report / name).glob(f"*.{suffix}")):
-                shutil.copyfile(path, target / path.name)
+        (place / "tables").mkdir(parents=True, exist_ok=True)
+        for path in [*sorted((report / "tables").glob("*.csv")), report / "tables" / REVISION]:
+            shutil.copyfile(path, place / "tables" / path.name)
+        for name in PUBLISHED_FIGURES:
+            if (report / "figures" / f"{name}.png").exists():
+                shutil.copyfile(report / "figures" / f"{name}.png", place / f"{name}.png")
         shutil.copyfile(report / PAGE, place / PUBLISHED)
     except OSError as error:
         raise cannot_write(place, error) from error

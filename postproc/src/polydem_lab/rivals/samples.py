@@ -10,6 +10,7 @@ from pathlib import Path
 
 from polydem_post.base.result_file import ResultError, cannot_read, cannot_write, insist_on_file
 
+from .codes import CODES
 from .problems import PROBLEMS
 
 #: File of the points of a study, and of the codes that took part and those that did not
@@ -105,8 +106,10 @@ def read_samples(folder: Path) -> list[Sample]:
 
 def _insist(sample: Sample, line: int) -> None:
     """ValueError for what no study holds."""
-    if sample.problem not in PROBLEMS or sample.status not in STATES:
-        raise ValueError(f"line {line}: the problem {sample.problem!r} or status {sample.status!r} is unknown")
+    known = {module.NAME for module in CODES.values()}
+    if sample.problem not in PROBLEMS or sample.status not in STATES or sample.column.partition(", ")[0] not in known:
+        raise ValueError(f"line {line}: the problem {sample.problem!r}, code {sample.column!r} or status "
+                         f"{sample.status!r} is unknown")
     if sample.status == "failed":
         return
     numbers = sample.median, sample.least, sample.steps

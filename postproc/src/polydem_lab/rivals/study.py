@@ -13,16 +13,15 @@ from pathlib import Path
 from polydem_post.base.result_file import ResultError, cannot_write
 
 from .codes import CODES, polydem
-from .measure import measure
-from .problems import Problem
+from .measure import BISECTIONS, measure
+from .problems import Problem, Threshold
 from .runs import Code, Missing, Places, RunError, Series
 from .samples import ORIGIN, Points, Sample
 
-#: Seconds that a point may be expected to take, from the coarser ones of its series, in a whole and in a short study
-LIMIT, QUICK_LIMIT = 30.0, 8.0
-
-#: Seconds up to which a measurement is repeated, likewise; a run is given up after so many times the limit
-REPEATED, QUICK_REPEATED, PATIENCE = 3.0, 0.5, 4.0
+#: Processor seconds that a point may be expected to take, from the coarser ones of its series, in a whole and in a
+#: short study; up to how many it is measured again; a run is given up after so many times the first
+LIMIT, QUICK_LIMIT = 30.0, 6.0
+REPEATED, QUICK_REPEATED, PATIENCE = 3.0, 0.5, 10.0
 
 #: A short study has every so many levels of a series
 STRIDE = 2
@@ -80,6 +79,7 @@ class Study:
         except OSError as error:
             raise cannot_write(scratch, error) from error
         self.places = Places(environment.resolve(), scratch, program)
+        self._durations: dict[str, float] = {}
         self.codes, self.missing = self._find()
         self._insist_on_laws()
         self._write_origin()
@@ -148,12 +148,22 @@ class Study:
         """Whether a point is not there yet, and the coarser ones were not too slow for it."""
         limit, repeated = (QUICK_LIMIT, QUICK_REPEATED) if self.plan.quick else (LIMIT, REPEATED)
         for sample in self._same(task):
-            if sample.level < task.level and sample.spent * task.series.growth ** (task.level - sample.level) > limit:
+            cost = self._cost(sample, task.problem)
+            if sample.level < task.level and cost * task.series.growth ** (task.level - sample.level) > limit:
                 return False
             if (sample.level, sample.seed) == (task.level, task.seed):
-                if sample.repeat == task.repeat or sample.status == "failed" or sample.spent > repeated:
+                if sample.repeat == task.repeat or sample.status == "failed" or cost > repeated:
                     return False
         return task.repeat == 0 or len(self.plan.seeds(task.problem)) == 1
+
+    def _cost(self, sample: Sample, problem: Problem) -> float:
+        """Processor seconds of the runs of a point."""
+        if sample.status == "failed":
+            return sample.spent
+        if problem.name not in self._durations:
+            self._durations[problem.name] = problem.scene(problem.seeds[0]).duration
+        searched = 2 + BISECTIONS if isinstance(problem, Threshold) else 1
+        return sample.median * self._durations[problem.name] * searched
 
     def _keep(self, task: Task, place: str) -> None:
         """Measure a point and add it to the file."""

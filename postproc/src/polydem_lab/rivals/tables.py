@@ -30,8 +30,8 @@ NONE = "-"
 
 def all_tables(found: Comparison, folder: Path) -> list[Table]:
     """Every table of a report that has rows."""
-    tables = [cheapest(found), least(found), stiffness(found), profile(found), seeds(found), body_steps(found),
-              spread(found), left_out(found, folder), points(found)]
+    tables = [cheapest(found), least(found), stiffness(found), profile(found), collective(found), body_steps(found),
+              spread(found), left_out(found, folder), seeds(found), points(found)]
     return [table for table in tables if table.rows]
 
 
@@ -104,21 +104,30 @@ def profile(found: Comparison) -> Table:
     return table
 
 
-def seeds(found: Comparison) -> Table:
-    """What is averaged over seeds."""
-    table = Table("rivals_seeds", "Over seeds", ("problem", "series", "level", "mean", "standard error", "worst",
-                                                 "error", "seeds", "time", "steps per s"), texts=2)
+def collective(found: Comparison) -> Table:
+    """Collective quantities and the floor of sampling."""
+    table = Table("rivals_collective", "Collective quantities, means over seeds",
+                  ("problem", "series", "level", "mean", "standard error", "error", "seeds", "time", "steps per s"),
+                  texts=2)
     for point in found.points:
-        if len(point.values) > 1 or isinstance(PROBLEMS[point.problem], Collective):
-            collective = isinstance(PROBLEMS[point.problem], Collective)
+        if isinstance(PROBLEMS[point.problem], Collective):
             table.add(point.problem, point.series, point.level, number(point.mean), _error(point.sampling),
-                      NONE if collective else _error(max(point.values)), _error(point.error), len(point.values),
-                      _error(point.median), number(point.steps))
-    for name, reference in found.references.items():
-        if reference:
-            table.note += (f"{name}: the error is that of the mean, from {number(reference[0])} +- "
-                           f"{number(reference[1], 2)}, the mean of the rivals at their finest steps. ")
-    table.note += "Elsewhere it is the root mean square of the errors of all seeds."
+                      _error(point.error), len(point.values), _error(point.median), number(point.steps))
+    table.note = "".join(
+        f"{name}: errors are those from {number(known[0])} +- {number(known[1], 2)}, the mean of the rivals at their "
+        "finest steps; twice its standard error is the floor of sampling. "
+        for name, known in found.references.items() if known).strip()
+    return table
+
+
+def seeds(found: Comparison) -> Table:
+    """Errors over seeds."""
+    table = Table("rivals_seeds", "Errors over seeds",
+                  ("problem", "series", "level", "error, rms", "error, worst", "seeds", "time"), texts=2)
+    for point in found.points:
+        if len(point.values) > 1 and not isinstance(PROBLEMS[point.problem], Collective):
+            table.add(point.problem, point.series, point.level, _error(point.error), _error(max(point.values)),
+                      len(point.values), _error(point.median))
     return table
 
 

@@ -37,7 +37,7 @@ FINER = (0.1, 0.03, 0.01)
 LEAST_RESTITUTION = 0.1
 
 #: Most repetitions of a run for its time; how often start-up is measured
-REPETITIONS, STARTS = 5, 3
+REPETITIONS, STARTS = 7, 5
 
 #: Where start-up takes nearly all of the time, its noise must not make steps faster than this [s]
 FASTEST = 1e-6
