@@ -10,9 +10,6 @@ from polydem_post.command_line.arguments import count, say, words
 
 from .paper import program
 
-#: Where other codes are installed unless the user says so
-ENVIRONMENT = Path(__file__).resolve().parents[4] / "build" / "rivals"
-
 #: Repeats of every point, in a whole and in a short study
 REPEATS, QUICK_REPEATS = 3, 2
 
@@ -29,7 +26,7 @@ def add_rivals(verbs) -> None:
     rivals.add_argument("--output", type=Path, default=Path("results/rivals"), metavar="DIR")
     rivals.add_argument("--report-only", action="store_true")
     rivals.add_argument("--publish", type=Path, metavar="DIR")
-    rivals.add_argument("--environment", type=Path, default=ENVIRONMENT, metavar="DIR")
+    rivals.add_argument("--environment", type=Path, default=Path("build/rivals"), metavar="DIR")
     rivals.add_argument("--program", type=program, action="append", default=[], metavar="double=PATH")
 
 

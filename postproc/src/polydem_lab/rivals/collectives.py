@@ -169,4 +169,3 @@ def _wall_depth(corners: np.ndarray, walls: list) -> float:
         inside = np.minimum(each.max(axis=0) - low, high - each.min(axis=0)).min(axis=1)
         depth = max(depth, float(inside.max(initial=0.0)))
     return depth
-

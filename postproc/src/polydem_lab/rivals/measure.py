@@ -66,4 +66,3 @@ def threshold(run, problem: Threshold, knobs: dict, patience: float) -> float:
             far = middle
     distance = 10.0 ** (0.5 * (near + far))
     return 1.0 + distance if too_strong else 1.0 - distance
-

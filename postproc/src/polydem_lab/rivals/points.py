@@ -189,4 +189,3 @@ def order_in_stiffness(points: list) -> float:
 def read_comparison(folder: Path) -> Comparison:
     """What the points in a folder say."""
     return Comparison(read_samples(folder))
-
