@@ -48,11 +48,6 @@ class Sample:
     spent: float
     message: str
 
-    @property
-    def key(self) -> tuple:
-        """What tells it from other measurements."""
-        return self.problem, self.series, self.level, self.seed, self.repeat, self.version
-
 
 KINDS = {"str": str, "int": int, "float": float}
 
@@ -62,7 +57,9 @@ class Points:
 
     def __init__(self, folder: Path):
         self.path = Path(folder) / FILE
-        self.samples = read_samples(folder) if self.path.exists() else []
+        self._known: dict[tuple, list[Sample]] = {}
+        for sample in read_samples(folder) if self.path.exists() else []:
+            self._remember(sample)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if not self.path.exists():
@@ -76,8 +73,15 @@ class Points:
 
     def add(self, sample: Sample) -> None:
         """Append a point."""
-        self.samples.append(sample)
+        self._remember(sample)
         self._append([getattr(sample, each.name) for each in fields(Sample)])
+
+    def of(self, problem: str, series: str, version: str) -> list[Sample]:
+        """Points of a series by a version of its code."""
+        return self._known.get((problem, series, version), [])
+
+    def _remember(self, sample: Sample) -> None:
+        self._known.setdefault((sample.problem, sample.series, sample.version), []).append(sample)
 
     def _append(self, row: list) -> None:
         with self.path.open("a", newline="", encoding="utf-8") as file:

@@ -77,7 +77,7 @@ class Study:
             scratch.mkdir(exist_ok=True)
             environment.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise cannot_write(scratch, error) from error
+            raise cannot_write(Path(error.filename or scratch), error) from error
         self.places = Places(environment.resolve(), scratch, program)
         self._durations: dict[str, float] = {}
         self.codes, self.missing = self._find()
@@ -140,9 +140,7 @@ class Study:
 
     def _same(self, task: Task) -> list[Sample]:
         """Points of the series of a task by the version of its code that is here."""
-        version = self.codes[task.word].version
-        return [sample for sample in self.points.samples
-                if (sample.problem, sample.series, sample.version) == (task.problem.name, task.series.name, version)]
+        return self.points.of(task.problem.name, task.series.name, self.codes[task.word].version)
 
     def _wanted(self, task: Task) -> bool:
         """Whether a point is not there yet, and the coarser ones were not too slow for it."""
