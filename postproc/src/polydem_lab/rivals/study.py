@@ -14,7 +14,7 @@ from polydem_post.base.result_file import ResultError, cannot_write
 
 from .codes import CODES, polydem
 from .measure import BISECTIONS, measure
-from .problems import Problem, Threshold
+from .problems import Collective, Problem, Threshold
 from .runs import Code, Missing, Places, RunError, Series
 from .samples import ORIGIN, Points, Sample
 
@@ -182,5 +182,6 @@ class Study:
         self.points.add(Sample(task.problem.name, name, task.series.name, task.level, json.dumps(knobs), task.seed,
                                task.repeat, code.version, status, error, median, least, runs, steps, load, spent,
                                message))
-        what = message or f"{'' if math.isnan(error) else f'error {error:.1e}, '}{median:.1e} s/s"
+        kind = "value" if isinstance(task.problem, Collective) else "error"
+        what = message or f"{'' if math.isnan(error) else f'{kind} {error:.1e}, '}{median:.1e} s/s"
         self.say(f"{place} {task.problem.name}, {task.series.name}, level {task.level}: {what}")
