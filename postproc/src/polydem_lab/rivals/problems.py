@@ -212,6 +212,9 @@ SLOPE, SLIDING, CREEPING = math.radians(30.0), 0.5, 0.5
 #: Nothing falls within the time of a run at a load nearer to the limit
 UNSEEN = 2e-4
 
+#: polydem runs the plastic impacts of the dominoes with a small restitution, which changes their speed by 2 %
+LOOSE = 3e-2
+
 PROBLEMS = {each.name: each for each in (
     Problem("slide", "block slides down a slope of 30 degrees for 2 s", "way",
             lambda seed: sliding(SLOPE, SLIDING, 2.0),
@@ -239,7 +242,7 @@ PROBLEMS = {each.name: each for each in (
               stiffness=(8, 11), refinement=5),
     Problem("gas", "elastic gas of 100 hexagons for 2 s", "energy", gas_scene, energy_error, seeds=(1, 2, 3, 4, 5),
             refinement=7, finer_steps=True),
-    Problem("domino", "row of 30 dominoes", "speed of the wave", train_scene, train_speed_error, 1e-2,
+    Problem("domino", "row of 30 dominoes", "speed of the wave", train_scene, train_speed_error, LOOSE,
             stiffness=(7, 10), refinement=5),
     Collective("hopper", "500 hexagons leave a hopper", "flow", hopper_scene, flow, seeds=tuple(range(1, 9)),
                stiffness=(7, 9), refinement=3, quick=False),

@@ -20,7 +20,7 @@ from .samples import ORIGIN, Points, Sample
 
 #: Processor seconds that a point may be expected to take, from the coarser ones of its series, in a whole and in a
 #: short study; up to how many it is measured again; a run is given up after so many times the first
-LIMIT, QUICK_LIMIT = 30.0, 6.0
+LIMIT, QUICK_LIMIT = 30.0, 8.0
 REPEATED, QUICK_REPEATED, PATIENCE = 3.0, 0.5, 10.0
 
 #: A short study has every so many levels of a series
