@@ -145,7 +145,7 @@ class Build(Toy):
 
     def test_wrong_words_of_verbs_that_build_for_minutes_are_refused_before(self):
         self.write_python()
-        for verb in ("paper", "workprecision"):
+        for verb in ("paper", "workprecision", "rivals"):
             self.assertEqual(self.call(verb, "--wrong"), (2, "", ""))
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src")))
 
@@ -160,6 +160,15 @@ class Build(Toy):
             expected += ["--program", f"{precision}={program}"]
         self.assertEqual(output.splitlines(), [*expected, "stack", "--repeats", "2"])
         self.assertEqual(self.call("workprecision", "--report-only")[1].splitlines(), [*expected[:3], "--report-only"])
+
+    def test_rivals_builds_one_program_and_hands_it_on(self):
+        self.write_python()
+        program = os.path.join(self.folder, "build", "release", "src", "app", "polydem")
+        code, output, messages = self.call("rivals", "slide", "--law", "area")
+        self.assertEqual((code, messages), (0, "polydem: building program in build/release\n"))
+        expected = ["-m", "polydem_post", "rivals"]
+        self.assertEqual(output.splitlines(), [*expected, "--program", f"double={program}", "slide", "--law", "area"])
+        self.assertEqual(self.call("rivals", "--report-only")[1].splitlines(), [*expected, "--report-only"])
 
     def test_build_judges_every_preset(self):
         presets = ("release", "mpi", "single", "quadruple", "debug")

@@ -20,6 +20,7 @@ import pytest
 from polydem_lab.costs.models import MODELS
 from polydem_lab.costs.models import Sample as CostSample
 from polydem_lab.precision.samples import Sample as WorkSample
+from polydem_lab.rivals.samples import Sample as RivalsSample
 from polydem_lab.scaling.exchange_model import Count
 from polydem_lab.scaling.exchange_runs import RunCount
 from polydem_post.base.emit import Table, printable
@@ -83,6 +84,9 @@ def whole(tmp_path_factory, finished):
                  steps=steps, repeat="0", status="finished", result="1 1 1 0.5")
             for steps in ("10", "20", "40") for precision in ("double", "quadruple")]
     write_csv(folder / "study" / "samples.csv", columns_of(WorkSample), rows)
+    rows = [some(RivalsSample, problem="stack", column=column, series=column, level=level, repeat="0",
+                 status="finished", error="1e-2") for column in ("polydem", "Chipmunk") for level in ("7", "8", "9")]
+    write_csv(folder / "rivals" / "points.csv", columns_of(RivalsSample), rows)
     write_csv(folder / "counts.csv", columns_of(Count), [some(Count, shape="drum", ranks="16", margin="0.2")])
     write_csv(folder / "runs.csv", columns_of(RunCount), [some(RunCount)])
     ring = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
@@ -123,6 +127,7 @@ VERBS = {
               ["bench/cache.csv", "bench/traces/drum_100/trace.h5"]),
     "costs": (["costs", "--program", "/bin/false", "--output", "costs"], ["costs/samples.csv"]),
     "workprecision": (["workprecision", "--report-only", "--output", "study"], ["study/samples.csv"]),
+    "rivals": (["rivals", "--report-only", "--output", "rivals"], ["rivals/points.csv"]),
     "scale runs": (["scale", "runs.csv"], ["runs.csv"]),
     "scale counts": (["scale", "counts.csv", "--body", "1e-6"], ["counts.csv"]),
     "scale a run": (["scale", "result", "--save", "saved.csv"], ["result/profile.h5", "result/trajectory_0001.h5"]),
@@ -318,10 +323,12 @@ def test_data_that_lie_in_other_files_are_refused(place, capfd, verb, name, kind
     assert "lie in other files" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("verb", ["plot", "table", "tables", "cache", "scale a run", "sweep collect", "workprecision"])
+@pytest.mark.parametrize("verb", ["plot", "table", "tables", "cache", "scale a run", "sweep collect", "workprecision",
+                                  "rivals"])
 def test_an_empty_folder_ends_with_a_sentence(tmp_path, capfd, verb):
     verb_itself, *words = VERBS[verb][0]
-    words = [verb_itself, *(str(tmp_path) if word in ("result", "bench", "sweep", "study") else word for word in words)]
+    folders = ("result", "bench", "sweep", "study", "rivals")
+    words = [verb_itself, *(str(tmp_path) if word in folders else word for word in words)]
     assert run(words, capfd) == 2
 
 

@@ -10,6 +10,7 @@ from polydem_post.base.result_file import ResultError
 from polydem_post.command_line import arguments
 
 from .paper import add_paper, program
+from .rivals import add_rivals
 
 
 def add_verbs(verbs) -> None:
@@ -22,6 +23,7 @@ def add_verbs(verbs) -> None:
     _add_cache(verbs)
     _add_costs(verbs)
     _add_workprecision(verbs)
+    add_rivals(verbs)
     _add_scale(verbs)
     add_paper(verbs)
 
