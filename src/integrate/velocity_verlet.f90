@@ -150,16 +150,19 @@ contains
    end subroutine serialize_step
 
    !> Stability limits for x'' + 2 z w x' + w^2 x = 0 with the force at the predicted velocity: beyond them the spectral
-   !> radius exceeds 1.
+   !> radius exceeds 1. It does so when velocity and acceleration change their signs in each step, where v = 0 and
+   !> a = -4 x/dt^2: (w dt)^2 + 8 z w dt = 4, w dt = 2 (sqrt(1 + 4 z^2) - 2 z). So a strong dashpot c on a mass m,
+   !> without a spring, allows c dt/m <= 1.
    function stability(self) result(table)
       class(velocity_verlet_t), intent(in) :: self
       type(stability_table_t) :: table
 
       associate (unused => self)
       end associate
-      table%damping_ratio = [0.0_wp, 0.0125_wp, 0.05_wp, 0.1_wp, 0.2_wp, 0.35_wp, 0.5_wp, 0.75_wp, 1.0_wp, 2.0_wp]
+      table%damping_ratio = [0.0_wp, 0.0125_wp, 0.05_wp, 0.1_wp, 0.2_wp, 0.35_wp, 0.5_wp, 0.75_wp, 1.0_wp, 1.2_wp, &
+                             1.4_wp, 1.7_wp, 2.0_wp]
       table%limit = [2.0_wp, 1.9507_wp, 1.81_wp, 1.6397_wp, 1.3542_wp, 1.0413_wp, 0.8285_wp, 0.6056_wp, 0.4722_wp, &
-                     0.2462_wp]
+                     0.4_wp, 0.3464_wp, 0.288_wp, 0.2462_wp]
    end function stability
 
 end module polydem_velocity_verlet

@@ -37,7 +37,7 @@ module polydem_expected_contact
 contains
 
    !> Describe the expected contact of a body: the greatest length, and the greatest ratios of all edges.
-   subroutine expect_contact(law, bodies, s, materials, speed, element, outline)
+   subroutine expect_contact(law, bodies, s, materials, speed, element, outline, across, turning)
       type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body
@@ -50,27 +50,36 @@ contains
       type(linearised_contact_t), intent(out) :: element
       !> Length of the outline [m]
       real(wp), intent(out) :: outline
+      !> Sum of the lengths of all edges, each times the square of the component of its normal along one direction; the
+      !> greatest of all directions [m]
+      real(wp), intent(out) :: across
+      !> Sum of the lengths of all edges, each times the square of the length of the contact there [m3]
+      real(wp), intent(out) :: turning
       type(cut_t) :: cut
       real(wp), allocatable :: shape(:, :)
-      real(wp) :: area
-      integer(ip) :: n, p, pieces(2), v, w
+      real(wp) :: area, length, distance
+      integer(ip) :: n, p, pieces(2), stride, v, w
 
-      call start_contact(bodies, s, speed, element, outline)
+      call start_contact(bodies, s, speed, element, outline, across)
       element%materials = materials
       if (materials(1) /= materials(2)) then
          element%normal_mass = bodies%mass(s)
          element%normal_mobility = bodies%inverse_mass(s)
       end if
+      turning = 0.0_wp
       pieces = bodies%pieces%pieces_of(s)
       do p = pieces(1), pieces(2)
          shape = centred(bodies%pieces, p)
          n = size(shape, 2, kind=ip)
          area = area_of(shape)
-         do v = 1_ip, n, 1_ip + (n - 1_ip)/most_cuts
+         stride = 1_ip + (n - 1_ip)/most_cuts
+         do v = 1_ip, n, stride
             w = merge(n, v - 1_ip, v == 1_ip)
+            call measure_edge(shape(:, w), shape(:, v), length, distance)
             call find_depth(law, shape, w, v, area, element, cut)
             element%edge_ratio = max(element%edge_ratio, cut%widest/(2.0_wp*cut%distance))
             element%square_ratio = max(element%square_ratio, cut%widest**2/area)
+            turning = turning + real(stride, wp)*length*cut%widest**2
             if (cut%widest >= element%length) then
                element%length = cut%widest
                element%depth = 2.0_wp*cut%area/cut%length
@@ -80,14 +89,15 @@ contains
    end subroutine expect_contact
 
    !> Start the expected contact with those of faces, at depth 0.
-   pure subroutine start_contact(bodies, s, speed, element, outline)
+   pure subroutine start_contact(bodies, s, speed, element, outline, across)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: speed
       type(linearised_contact_t), intent(out) :: element
-      !> Length of the outline [m]
-      real(wp), intent(out) :: outline
+      !> As in `expect_contact`
+      real(wp), intent(out) :: outline, across
       real(wp), allocatable :: shape(:, :)
+      real(wp) :: skew(2)
       integer(ip) :: p, pieces(2), v
 
       element%is_expected = .true.
@@ -96,14 +106,16 @@ contains
       element%normal_mass = 0.5_wp*bodies%mass(s)
       element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
       outline = 0.0_wp
+      skew = 0.0_wp
       do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip
          element%radius_square = max(element%radius_square, sum(bodies%pieces%vertex(:, v)**2))
       end do
       pieces = bodies%pieces%pieces_of(s)
       do p = pieces(1), pieces(2)
          shape = centred(bodies%pieces, p)
-         call measure_faces(shape, element, outline)
+         call measure_faces(shape, element, outline, skew)
       end do
+      across = 0.5_wp*(outline + sqrt(skew(1)**2 + skew(2)**2))
       element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
       element%rolling_radius = sqrt(element%radius_square)
       element%rolling_inertia = bodies%inertia(s) + bodies%mass(s)*element%radius_square
@@ -120,13 +132,13 @@ contains
    end function centred
 
    !> Add the faces of a piece.
-   pure subroutine measure_faces(shape, element, outline)
+   pure subroutine measure_faces(shape, element, outline, skew)
       !> Vertices, anticlockwise, (2, :) [m]
       real(wp), intent(in) :: shape(:, :)
       type(linearised_contact_t), intent(inout) :: element
-      !> Length of the outline so far [m]
-      real(wp), intent(inout) :: outline
-      real(wp) :: length, distance, longest
+      !> Length of the outline so far, and sum of the lengths of edges as vectors along twice their angles [m]
+      real(wp), intent(inout) :: outline, skew(2)
+      real(wp) :: length, distance, longest, edge(2)
       integer(ip) :: v, w
 
       longest = 0.0_wp
@@ -134,6 +146,8 @@ contains
       do v = 1_ip, size(shape, 2, kind=ip)
          call measure_edge(shape(:, w), shape(:, v), length, distance)
          outline = outline + length
+         edge = shape(:, v) - shape(:, w)
+         skew = skew + [edge(1)**2 - edge(2)**2, 2.0_wp*edge(1)*edge(2)]/length
          longest = max(longest, length)
          element%edge_ratio = max(element%edge_ratio, length/(2.0_wp*distance))
          w = v

@@ -3,8 +3,8 @@
 !> Each contact is an element with the normal stiffness K_n, the tangential stiffness K_t and the mobilities G of its
 !> two bodies. The mass of a body is divided among its n contacts. The greatest eigenvalue of K^(1/2) G K^(1/2) over all
 !> elements is an upper bound of the squared frequencies of the whole system (element bound; similar to C. O'Sullivan &
-!> J.D. Bray, Eng. Comput. 21 (2004) 278). The integration scheme has a largest stable product of frequency and step,
-!> given as a function of the damping ratio.
+!> J.D. Bray, Eng. Comput. 21 (2004) 278; another one is `polydem_stable_bodies`). The integration scheme has a largest
+!> stable product of frequency and step, given as a function of the damping ratio.
 !>
 !> The parts of the force law add the stiffnesses and dashpots (`stiffen`). The stiffness against tilts is added to the
 !> squared frequency of the other two.
@@ -18,6 +18,7 @@ module polydem_stable_step
    use polydem_expected_contact, only: expect_contact
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_present_contact, only: describe_contact
    use polydem_stability_limit, only: stability_table_t, limit_at
    implicit none
    private
@@ -26,6 +27,8 @@ module polydem_stable_step
 
    !> Assumed number of contacts of the two equal bodies of an expected contact: four of each body
    real(wp), parameter :: assumed_contacts = 8.0_wp
+   !> Damping ratio of an expected contact up to which damping is moderate
+   real(wp), parameter :: moderate = 0.75_wp
 
 contains
 
@@ -169,11 +172,11 @@ contains
       !> Depth and length of the contact [m], and its stable step over that without dashpots
       real(wp), intent(out) :: found(3)
       type(linearised_contact_t) :: element
-      real(wp) :: g(4), outline, share, number
+      real(wp) :: g(4), outline, across, turning, number, share, full, shared, undamped
 
       number = assumed_contacts
       if (materials(1) /= materials(2)) number = 0.5_wp*assumed_contacts
-      call expect_contact(law, bodies, s, materials, speed, element, outline)
+      call expect_contact(law, bodies, s, materials, speed, element, outline, across, turning)
       g(1) = number*bodies%inverse_mass(s) + (yielding(1) + yielding(2)/bodies%diameter(s))
       g(2) = number*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s)) &
              + (yielding(1) + yielding(2)/bodies%diameter(s))
@@ -181,16 +184,31 @@ contains
       g(4) = number*bodies%inverse_inertia(s)
       element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
       call law%stiffen(element)
-      ! The contacts of a body share its outline, and so do their dashpots. The springs do not, for accuracy: then an
-      ! impact of two bodies takes at least ten steps.
+      ! Springs count in full, for accuracy: then an impact of two bodies takes at least ten steps. So do moderate
+      ! dashpots, as many as fit on the outline. Of strong ones those count that act along one direction, and the sum
+      ! of those that act against rotation: an impact leaves little of which the error might matter.
       share = min(1.0_wp, outline/(0.5_wp*assumed_contacts*element%length))
-      element%normal_dashpot = element%normal_dashpot*share
-      element%tilt_dashpot = element%tilt_dashpot*share
-      step = step_of_element(table, element, g)
-      element%normal_dashpot = 0.0_wp
+      full = with_dashpots(share, share)
+      shared = with_dashpots(share*(across/outline), &
+                             min(1.0_wp, turning/(0.5_wp*assumed_contacts*element%length**3)))
       element%tangential_dashpot = 0.0_wp
-      element%tilt_dashpot = 0.0_wp
-      found = [element%depth, element%length, step/step_of_element(table, element, g)]
+      undamped = with_dashpots(0.0_wp, 0.0_wp)
+      step = max(full, min(shared, undamped*(limit_at(table, moderate)/limit_at(table, 0.0_wp))))
+      found = [element%depth, element%length, step/undamped]
+
+   contains
+
+      !> Stable step with shares of the dashpots against approach and against tilts [s]
+      pure real(wp) function with_dashpots(approach, tilt)
+         real(wp), intent(in) :: approach, tilt
+         type(linearised_contact_t) :: other
+
+         other = element
+         other%normal_dashpot = element%normal_dashpot*approach
+         other%tilt_dashpot = element%tilt_dashpot*tilt
+         with_dashpots = step_of_element(table, other, g)
+      end function with_dashpots
+
    end subroutine find_step_of_pair
 
    !> Stable step of a contact whose bodies have no other contacts [s]
@@ -219,50 +237,11 @@ contains
       !> Mobility of a wall that yields [m/kg]
       real(wp), intent(in) :: extra
       type(linearised_contact_t) :: element
-      real(wp) :: g(4), alone(4), rolling(2)
+      real(wp) :: mobility(4, 2), lever(2, 2)
 
-      g = [extra, extra, 0.0_wp, 0.0_wp]
-      alone = 0.0_wp
-      rolling = 0.0_wp
-      call add_body(contacts%first(c), contacts%arm_first(:, c), numbers(1))
-      call add_body(contacts%second(c), contacts%arm_second(:, c), numbers(2))
-      if (allocated(bodies%material)) element%materials = bodies%material([contacts%first(c), contacts%second(c)])
-      element%area = contacts%area(c)
-      element%length = contacts%length(c)
-      element%inverse_length = contacts%inverse_length(c)
-      element%ratio = element%length*element%inverse_length
-      element%elastic = contacts%elastic(c)
-      element%repulsion = contacts%normal_force(c)
-      element%normal_mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-      element%normal_mass = 1.0_wp/element%normal_mobility
-      element%tangential_mass = 1.0_wp/alone(2)
-      element%rotational_mobility = alone(4)
-      element%rolling_radius = 1.0_wp/rolling(1)
-      element%rolling_inertia = 1.0_wp/rolling(2)
-      call law%stiffen(element)
-      step_of_contact = step_of_element(table, element, g)
-
-   contains
-
-      !> Add the normal, tangential, mixed and rotational mobility of one body.
-      subroutine add_body(s, arm, number)
-         integer(ip), intent(in) :: s
-         real(wp), intent(in) :: arm(2), number
-         real(wp) :: along, across, mine(4)
-
-         if (bodies%fixed(s)) return
-         across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c) + contacts%lever(c)
-         along = arm(1)*contacts%direction(1, c) + arm(2)*contacts%direction(2, c)
-         mine(1) = bodies%inverse_mass(s) + across*across*bodies%inverse_inertia(s)
-         mine(2) = bodies%inverse_mass(s) + along*along*bodies%inverse_inertia(s)
-         mine(3) = along*across*bodies%inverse_inertia(s)
-         mine(4) = bodies%inverse_inertia(s)
-         alone = alone + mine
-         rolling = rolling + [1.0_wp/bodies%radius(s), &
-                              1.0_wp/(bodies%inertia(s) + bodies%mass(s)*bodies%radius(s)**2)]
-         g = g + mine*number
-      end subroutine add_body
-
+      call describe_contact(law, bodies, contacts, c, element, mobility, lever)
+      step_of_contact = step_of_element(table, element, ([extra, extra, 0.0_wp, 0.0_wp] &
+                                                         + mobility(:, 1)*numbers(1)) + mobility(:, 2)*numbers(2))
    end function step_of_contact
 
    !> Product of ratio L/l and mobility below which no contact, alone, has a stable step below a given one [m/kg].

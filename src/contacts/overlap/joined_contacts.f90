@@ -31,6 +31,8 @@ module polydem_joined_contacts
 
    !> Distance of points that count as one over the radius of the body
    real(wp), parameter :: tolerance = 1.0e-10_wp
+   !> Least length of a contact over the root of its area: rounding
+   real(wp), parameter :: least_length = 1.0e-12_wp
 
 contains
 
@@ -196,12 +198,13 @@ contains
          block%normal(c, :) = -new%normal
          block%moment(c, :) = -new%moment([2, 1])
       end if
-      block%length(c) = sqrt(new%normal(1)**2 + new%normal(2)**2)
+      ! Where the outline of the body is not inside the piece, its part of the force is zero or a couple.
+      block%length(c) = max(sqrt(new%normal(1)**2 + new%normal(2)**2), least_length*sqrt(block%area(c)))
       block%length_square(c) = new%length_square
       block%depth(c) = new%depth
       block%rate(c) = dot_product(block%normal(c, :), block%velocity_first(c, :) - block%velocity_second(c, :)) &
          + (block%moment(c, 1)*block%angular_velocity(c, 1) - block%moment(c, 2)*block%angular_velocity(c, 2))
-      block%direction(c, :) = -block%normal(c, :)/max(block%length(c), tiny(block%length(c)))
+      block%direction(c, :) = -block%normal(c, :)/block%length(c)
    end subroutine replace_overlap
 
 end module polydem_joined_contacts

@@ -7,6 +7,8 @@ module polydem_stability_check
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_simulation, only: simulation_t
+   use polydem_stability_limit, only: stability_table_t
+   use polydem_stable_bodies, only: stable_step_of_bodies
    use polydem_stable_step, only: contact_numbers, stable_step_alone, stable_step_of_contacts
    use polydem_strings, only: to_text
    use polydem_wall_load, only: wall_mobilities
@@ -132,18 +134,26 @@ contains
       real(wp), intent(out) :: stable
       !> Index of the contact that limits it; 0 if this rank does not have it
       integer(ip), intent(out) :: critical
+      type(stability_table_t) :: table
       real(wp), allocatable :: numbers(:), yielding(:)
-      real(wp) :: least(1)
+      real(wp) :: steps(2), least(2)
+      integer(ip) :: limiting(2)
+      integer :: k
 
       numbers = contact_numbers(self%bodies%n, self%loop%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
       if (allocated(self%walls%loads)) yielding = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
-      call stable_step_of_contacts(self%law, self%motion%integrator%stability(), self%bodies, numbers, self%contacts, &
-                                   stable, critical, yielding)
-      least = stable
+      table = self%motion%integrator%stability()
+      call stable_step_of_contacts(self%law, table, self%bodies, numbers, self%contacts, steps(1), limiting(1), &
+                                   yielding)
+      call stable_step_of_bodies(self%law, table, self%bodies, self%contacts, self%loop%incidence, steps(2), &
+                                 limiting(2), yielding)
+      least = steps
       call reduce_to_least(self%comm, least)
-      if (stable > least(1)) critical = 0_ip
-      stable = least(1)
+      ! Each of both is a bound.
+      k = maxloc(least, 1)
+      stable = least(k)
+      critical = merge(0_ip, limiting(k), steps(k) > stable)
    end subroutine find_stable_step
 
    !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.

@@ -1,0 +1,74 @@
+!> The springs and dashpots of a contact of the table, and the mobilities of its two bodies at the contact point.
+module polydem_present_contact
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t
+   use polydem_force_law, only: force_law_t
+   use polydem_kinds, only: ip, wp
+   use polydem_linearised_contact, only: linearised_contact_t
+   implicit none
+   private
+   public :: describe_contact
+
+contains
+
+   !> Describe contact c.
+   subroutine describe_contact(law, bodies, contacts, c, element, mobility, lever)
+      type(force_law_t), intent(in) :: law
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      !> Its index
+      integer(ip), intent(in) :: c
+      !> Its springs and dashpots
+      type(linearised_contact_t), intent(out) :: element
+      !> Mobilities of the first and the second body: normal, tangential, mixed [m/kg], rotational [1/(kg m)]; 0 of a
+      !> fixed body
+      real(wp), intent(out) :: mobility(4, 2)
+      !> Levers of the normal and the tangential force about the centre of each body [m]
+      real(wp), intent(out) :: lever(2, 2)
+      real(wp) :: alone(4), rolling(2)
+
+      mobility = 0.0_wp
+      lever = 0.0_wp
+      rolling = 0.0_wp
+      call add_body(contacts%first(c), contacts%arm_first(:, c), 1)
+      call add_body(contacts%second(c), contacts%arm_second(:, c), 2)
+      alone = mobility(:, 1) + mobility(:, 2)
+      if (allocated(bodies%material)) element%materials = bodies%material([contacts%first(c), contacts%second(c)])
+      element%area = contacts%area(c)
+      element%length = contacts%length(c)
+      element%inverse_length = contacts%inverse_length(c)
+      element%ratio = element%length*element%inverse_length
+      element%elastic = contacts%elastic(c)
+      element%repulsion = contacts%normal_force(c)
+      element%normal_mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
+      element%normal_mass = 1.0_wp/element%normal_mobility
+      element%tangential_mass = 1.0_wp/alone(2)
+      element%rotational_mobility = alone(4)
+      element%rolling_radius = 1.0_wp/rolling(1)
+      element%rolling_inertia = 1.0_wp/rolling(2)
+      call law%stiffen(element)
+
+   contains
+
+      !> Add the mobilities of one body.
+      subroutine add_body(s, arm, k)
+         integer(ip), intent(in) :: s
+         real(wp), intent(in) :: arm(2)
+         !> 1 for the first body, 2 for the second
+         integer, intent(in) :: k
+         real(wp) :: along, across
+
+         if (bodies%fixed(s)) return
+         across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c) + contacts%lever(c)
+         along = arm(1)*contacts%direction(1, c) + arm(2)*contacts%direction(2, c)
+         lever(:, k) = [across, along]
+         mobility(:2, k) = bodies%inverse_mass(s) + [across*across, along*along]*bodies%inverse_inertia(s)
+         mobility(3:, k) = [along*across, 1.0_wp]*bodies%inverse_inertia(s)
+         rolling = rolling + [1.0_wp/bodies%radius(s), &
+                              1.0_wp/(bodies%inertia(s) + bodies%mass(s)*bodies%radius(s)**2)]
+      end subroutine add_body
+
+   end subroutine describe_contact
+
+end module polydem_present_contact
