@@ -1,8 +1,8 @@
 !> How near to rigid bodies a scene is: the least stiffness over its pressures, and what that means for its force law.
 !>
-!> The errors are fits c (P/E)^n to runs of two problems with known rigid answers: the angular velocity of a block of
-!> 1 x 4 that topples under its own weight, where P is that of four blocks, and the velocity of a square after an
-!> elastic impact on its corner, where P is density times speed squared (page of the verification).
+!> The errors are fits c (P/E)^n to two problems with known rigid answers: the steepest slope on which a block of 1 x 4
+!> stands, where P is its weight over its width, and the velocity of a square after an elastic impact on its corner,
+!> where P is density times speed squared. `test_rigidity` measures them.
 module polydem_rigidity
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
@@ -15,8 +15,8 @@ module polydem_rigidity
 
    !> Coefficient and exponent of the errors of a law
    type :: fit_t
-      !> Name in &forces
-      character(len=15) :: law
+      !> Name of the law, with which the description of the parts begins
+      character(len=21) :: name
       !> Coefficient and exponent of tipping, (2)
       real(wp) :: tipping(2)
       !> Those of an impact on a corner, (2)
@@ -26,11 +26,11 @@ module polydem_rigidity
    real(wp), parameter :: third = 1.0_wp/3.0_wp
    !> Fits of all laws
    type(fit_t), parameter :: fits(5) = [ &
-      fit_t('polar', [10.5_wp, 1.0_wp], [3.0_wp, 0.5_wp]), &
-      fit_t('effective_polar', [9.5_wp, 1.0_wp], [2.8_wp, 0.5_wp]), &
-      fit_t('conservative', [2.9_wp, 0.25_wp], [1.8_wp, 0.25_wp]), &
-      fit_t('area', [2.9_wp, third], [0.53_wp, third]), &
-      fit_t('own_length', [2.84_wp, third], [0.44_wp, third])]
+      fit_t('polar law', [9.7_wp, 1.0_wp], [3.35_wp, 0.5_wp]), &
+      fit_t('effective polar law', [8.4_wp, 1.0_wp], [3.2_wp, 0.5_wp]), &
+      fit_t('conservative law', [4.7_wp, 0.25_wp], [4.2_wp, 0.3_wp]), &
+      fit_t('area law', [5.45_wp, third], [2.7_wp, 0.45_wp]), &
+      fit_t('law of the own length', [4.4_wp, third], [2.1_wp, 0.44_wp])]
 
 contains
 
@@ -43,45 +43,45 @@ contains
       character(len=:), allocatable :: text
 
       if (measures%free == 0_ip) return
-      associate (s => simulation, law => simulation%settings%forces%law)
+      associate (s => simulation, parts => simulation%law%description)
          text = 'stiffness  E = '//to_text(measures%stiffness, 3)//' N/m2'
          if (measures%softness > 0.0_wp) text = text//', '//to_text(1.0_wp/measures%softness, 2)// &
             ' times the static pressure '//to_text(s%pressure%greatest, 2)//' N/m2 '//s%pressure%origin// &
             ': faces '//to_text(measures%softness, 2)//' of a grain deep, error of tipping '// &
-            share_text(tipping_error(law, measures%softness))
+            share_text(tipping_error(parts, measures%softness))
          call log%write_line(text)
          if (measures%impact_softness > 0.0_wp) call log%write_line('           '// &
             to_text(1.0_wp/measures%impact_softness, 2)//' times the pressure of impacts at '// &
             to_text(s%expected%speed, 3)//' m/s: error of an elastic impact on a corner '// &
-            share_text(impact_error(law, measures%impact_softness)))
+            share_text(impact_error(parts, measures%impact_softness)))
       end associate
    end subroutine describe_rigidity
 
-   !> Error of the angular velocity of a block that topples, relative to the rigid one
-   pure real(wp) function tipping_error(law, softness)
-      !> Name of the elastic law
-      character(len=*), intent(in) :: law
+   !> Error of the tangent of the slope on which a block of 1 x 4 topples
+   pure real(wp) function tipping_error(parts, softness)
+      !> Description of the force law
+      character(len=*), intent(in) :: parts
       !> Static pressure over stiffness
       real(wp), intent(in) :: softness
       integer :: k
 
       tipping_error = 0.0_wp
       do k = 1, size(fits)
-         if (fits(k)%law == law) tipping_error = fits(k)%tipping(1)*softness**fits(k)%tipping(2)
+         if (index(parts, trim(fits(k)%name)) == 1) tipping_error = fits(k)%tipping(1)*softness**fits(k)%tipping(2)
       end do
    end function tipping_error
 
    !> Error of the velocity after an impact on a corner, over the speed of the impact
-   pure real(wp) function impact_error(law, softness)
-      !> Name of the elastic law
-      character(len=*), intent(in) :: law
+   pure real(wp) function impact_error(parts, softness)
+      !> Description of the force law
+      character(len=*), intent(in) :: parts
       !> Pressure of the impact over stiffness
       real(wp), intent(in) :: softness
       integer :: k
 
       impact_error = 0.0_wp
       do k = 1, size(fits)
-         if (fits(k)%law == law) impact_error = fits(k)%impact(1)*softness**fits(k)%impact(2)
+         if (index(parts, trim(fits(k)%name)) == 1) impact_error = fits(k)%impact(1)*softness**fits(k)%impact(2)
       end do
    end function impact_error
 
@@ -93,7 +93,7 @@ contains
       integer(ip) :: decade
 
       if (error > 1.0_wp) then
-         text = 'above 100 %: far from rigid'
+         text = 'above 100 %, far from rigid'
       else if (error >= 0.1_wp) then
          text = 'about '//to_text(10_ip*nint(10.0_wp*error, ip))//' %'
       else if (error >= 0.0095_wp) then

@@ -131,8 +131,9 @@ contains
    !> Pressure of a load on the width of its wall, with the weight of the wall if its mass is given; 0 of a torque [N/m2]
    function load_pressure(self, load, number) result(pressure)
       type(simulation_t), intent(in) :: self
-      !> The load, and its number
+      !> The load
       type(load_settings_t), intent(in) :: load
+      !> Its number
       integer, intent(in) :: number
       real(wp) :: pressure, force, extent(2)
 
