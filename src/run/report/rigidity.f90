@@ -4,6 +4,7 @@
 !> stands, where P is its weight over its width, and the velocity of a square after an elastic impact on its corner,
 !> where P is density times speed squared. `test_rigidity` measures them.
 module polydem_rigidity
+   use polydem_elementary, only: exponential, logarithm
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
    use polydem_scene_measures, only: scene_measures_t
@@ -11,7 +12,7 @@ module polydem_rigidity
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: describe_rigidity, tipping_error, impact_error
+   public :: describe_rigidity, tipping_error, impact_error, share_text
 
    !> Coefficient and exponent of the errors of a law
    type :: fit_t
@@ -67,7 +68,7 @@ contains
 
       tipping_error = 0.0_wp
       do k = 1, size(fits)
-         if (index(parts, trim(fits(k)%name)) == 1) tipping_error = fits(k)%tipping(1)*softness**fits(k)%tipping(2)
+         if (index(parts, trim(fits(k)%name)) == 1) tipping_error = fitted(fits(k)%tipping, softness)
       end do
    end function tipping_error
 
@@ -81,16 +82,24 @@ contains
 
       impact_error = 0.0_wp
       do k = 1, size(fits)
-         if (index(parts, trim(fits(k)%name)) == 1) impact_error = fits(k)%impact(1)*softness**fits(k)%impact(2)
+         if (index(parts, trim(fits(k)%name)) == 1) impact_error = fitted(fits(k)%impact, softness)
       end do
    end function impact_error
+
+   !> A coefficient times a power with a real exponent
+   pure real(wp) function fitted(fit, softness)
+      !> Coefficient and exponent, (2)
+      real(wp), intent(in) :: fit(2)
+      real(wp), intent(in) :: softness
+
+      fitted = fit(1)*exponential(fit(2)*logarithm(softness))
+   end function fitted
 
    !> An error as text: in per cent with one digit
    pure function share_text(error) result(text)
       !> Error as a share
       real(wp), intent(in) :: error
       character(len=:), allocatable :: text
-      integer(ip) :: decade
 
       if (error > 1.0_wp) then
          text = 'above 100 %, far from rigid'
@@ -99,10 +108,9 @@ contains
       else if (error >= 0.0095_wp) then
          text = 'about '//to_text(nint(100.0_wp*error, ip))//' %'
       else if (error >= 0.00095_wp) then
-         decade = nint(1000.0_wp*error, ip)
-         text = 'about 0.'//to_text(decade)//' %'
+         text = 'about 0.'//to_text(nint(1000.0_wp*error, ip))//' %'
       else
-         text = 'about '//to_text(100.0_wp*error, 1)//' %'
+         text = 'about '//to_text(100.0_wp*error, 2)//' %'
       end if
    end function share_text
 
