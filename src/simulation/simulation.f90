@@ -56,6 +56,16 @@ module polydem_simulation
       integer(lp) :: body = 0_lp
    end type expected_impact_t
 
+   !> The greatest static pressure of the scene
+   type :: static_pressure_t
+      !> Pressure; 0: there is none [N/m2]
+      real(wp) :: greatest = 0.0_wp
+      !> Where it comes from
+      character(len=:), allocatable :: origin
+      !> Whether it is the weight of the free bodies
+      logical :: is_of_bodies = .false.
+   end type static_pressure_t
+
    !> The complete state of a simulation on one rank
    type :: simulation_t
       !> Settings of the run; gravity and drag of the group &forces are those of the present stage
@@ -104,6 +114,8 @@ module polydem_simulation
       real(wp) :: expected_stable_step = 0.0_wp
       !> The impact for which it is estimated
       type(expected_impact_t) :: expected
+      !> The static pressure of the bodies at the start
+      type(static_pressure_t) :: pressure
       !> Number of bodies that were outside the periodic cell at the start
       integer(lp) :: n_outside = 0_lp
       !> Summary of the relaxation before time 0

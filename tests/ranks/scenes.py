@@ -34,7 +34,8 @@ SCENES = {
 &forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 midstep_slip = .false. /
 &integrate accumulation = 'compensated' safety_factor = 0.2 duration = 0.02 /
 """,
-    # A turning ring and a funnel of parts; three groups of grains, each placed around walls and earlier ones; drag.
+    # A turning ring and a funnel of parts; three groups of grains, each placed around walls and earlier ones; drag; a
+    # stiffness that follows from the pressure of the grains of all ranks.
     "parts": """\
 &wall name = 'drum' outline = 'ring' radius = 0.1 segments = 30 thickness = 0.01 /
 &wall name = 'funnel' outline = 'polyline' vertices = -0.06, 0.02, -0.01, -0.03 thickness = 0.004 /
@@ -45,7 +46,7 @@ SCENES = {
 &grains name = 'fines' region = 'box' low = -0.06, 0.03 high = 0.06, 0.07 number = 60 arrangement = 'random'
    shape = 'regular' corners = 5, 8 diameter = 3e-3, 5e-3 momentum = 'zero' speed = 1 spin = 30 /
 &motion name = 'turn' kind = 'rotation' rate = 2.0 wall = 'drum' /
-&forces gravity = 0, -40 stiffness = 1e6 drag = 2 /
+&forces gravity = 0, -40 stiffness_over_pressure = 50 drag = 2 /
 &integrate duration = 0.01 /
 """,
     # Crosses of three pieces and pebbles of one in a ring that turns; both laws of history: friction and dashpots.

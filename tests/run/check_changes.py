@@ -50,6 +50,21 @@ def what_enters_after_a_restart_moves_with_the_shear(case):
     assert hash_of(parts) == hash_of(whole), (parts, whole)
 
 
+def a_stiffness_that_follows_from_the_pressure_stays(case):
+    """Finds a run that goes on with another stiffness; and a start from its result that does not take the present P."""
+    scene = SCENE.format(seed=1).replace("stiffness = 2e5", "stiffness_over_pressure = 300")
+    whole = case.run(scene + OUTPUT.format(duration="duration = 3.125e-2", scheme=""), "stiff")
+    case.run(scene + OUTPUT.format(duration="duration = 1.5625e-2", scheme=""), "halves")
+    halves = case.run(scene + OUTPUT.format(duration="duration = 3.125e-2", scheme=""), "halves", "--continue")
+    assert hash_of(halves) == hash_of(whole), (halves, whole)
+    start = FOUND + "&forces stiffness_over_pressure = 300 friction_coefficient = 0.5 /\n"
+    start += "&scene name = 'result' start_from = 'stiff' /\n"
+    lower = case.run(start + OUTPUT.format(duration="duration = 7.8125e-3", scheme=""), "lower", "--force")
+    before, after = (float(re.search(r"^stiffness  E = (\S+) N/m2, 3.0E\+02 times", output, re.MULTILINE).group(1))
+                     for output in (whole, lower))
+    assert after != before, (before, after)
+
+
 def main():
     case = Case(os.path.abspath(sys.argv[1]))
     with tempfile.TemporaryDirectory() as work:
@@ -57,6 +72,7 @@ def main():
         another_gravity_counts_the_whole_path(case)
         what_leaves_before_the_first_step_takes_its_energy(case)
         what_enters_after_a_restart_moves_with_the_shear(case)
+        a_stiffness_that_follows_from_the_pressure_stays(case)
 
 
 if __name__ == "__main__":

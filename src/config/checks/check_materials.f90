@@ -44,6 +44,8 @@ contains
       integer :: k
 
       do k = 1, size(parameters)
+         ! The stiffness is in use, whether &forces gives it or its ratio to the pressure.
+         if (parameters(k) == 'stiffness') cycle
          associate (value => group%values(row_of(group, trim(parameters(k)))))
             if (.not. value%is_given .or. forces%values(row_of(forces, trim(parameters(k))))%is_active) cycle
             if (any(forces%values%is_override) .and. .not. value%is_override) cycle

@@ -60,6 +60,7 @@ contains
             end if
          end associate
          call check_gravity(settings, group, error)
+         call check_pressure(settings, group, error)
       end associate
       if (settings%output%csv .and. .not. settings%output%series_interval > 0.0_wp) then
          associate (group => instances(index_of_instance(instances, 'output')))
@@ -103,6 +104,27 @@ contains
             '0; give ''gravity'', for example 0, -9.81')
       end associate
    end subroutine check_gravity
+
+   !> Check that the static pressure by which the stiffness is chosen is known once the bodies are placed.
+   pure subroutine check_pressure(settings, group, error)
+      type(settings_t), intent(in) :: settings
+      !> The group &forces
+      type(instance_t), intent(in) :: group
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: sinks_in
+      integer :: k
+
+      if (.not. allocated(settings%forces%stiffness_over_pressure)) return
+      sinks_in = any(settings%scene%name == ['incline', 'stack  '])
+      do k = 1, size(settings%grains)
+         sinks_in = sinks_in .or. settings%grains(k)%arrangement == 'column'
+      end do
+      if (sinks_in) call blame(group, 'stiffness_over_pressure', 'cannot be used with blocks that start as deep in '// &
+         'each other as their stiffness lets them sink; give ''stiffness''', error)
+      if (size(settings%source) > 0) call blame(group, 'stiffness_over_pressure', 'cannot be combined with '// &
+         '&source, because the pressure of bodies that enter during the run is not known at its start; give '// &
+         '''stiffness''', error)
+   end subroutine check_pressure
 
    !> Check entries of &scene against each other.
    pure subroutine check_scene(settings, group, error)

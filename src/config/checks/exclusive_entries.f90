@@ -1,4 +1,4 @@
-!> The two entries that set the damping in different ways, of which at most one may be given.
+!> Entries of which at most one of two may be given.
 module polydem_exclusive_entries
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: instance_t
@@ -11,33 +11,49 @@ module polydem_exclusive_entries
 
 contains
 
-   !> Leave one of both entries in use: the damping coefficient if it is given, otherwise the restitution. An entry of
-   !> the command line takes precedence over one of the file. The resolved text can then be read again.
+   !> Leave one entry of each pair in use: the damping coefficient if it is given, otherwise the restitution; the
+   !> stiffness over the pressure if it is given, otherwise the stiffness. The resolved text can then be read again.
    pure subroutine resolve_exclusive_entries(instance, error)
       !> The group &forces with its values
       type(instance_t), intent(inout) :: instance
-      !> Both entries are given
+      !> Both entries of a pair are given
       type(error_t), allocatable, intent(inout) :: error
-      integer :: other, row
-      logical :: use_special
+      integer :: row
 
       row = first_row('forces', 'restitution')
-      other = first_row('forces', 'damping_coefficient')
-      associate (special => instance%values(row), usual => instance%values(other))
-         if (.not. special%is_active) return
-         use_special = .not. usual%is_given
-         if (special%is_given .and. usual%is_given) then
-            if (special%is_override .eqv. usual%is_override) then
-               call raise(error, input_error, special%place//': '//label(entries(row))//' cannot be combined with '// &
-                  label(entries(other))//'; give only one of them')
+      if (instance%values(row)%is_active) then
+         call choose_one(instance, row, first_row('forces', 'damping_coefficient'), error)
+         if (allocated(error)) return
+         if (.not. instance%values(row)%is_active) instance%values(row)%reals = 0.0_wp
+      end if
+      row = first_row('forces', 'stiffness_over_pressure')
+      if (.not. instance%values(row)%is_active) return
+      call choose_one(instance, first_row('forces', 'stiffness'), row, error)
+      if (.not. instance%values(row)%is_active) instance%values(row)%reals = [real(wp) ::]
+   end subroutine resolve_exclusive_entries
+
+   !> Leave one of two entries in use: the second one if it is given, otherwise the first one. An entry of the command
+   !> line takes precedence over one of the file.
+   pure subroutine choose_one(instance, first, second, error)
+      type(instance_t), intent(inout) :: instance
+      !> Rows of the entries
+      integer, intent(in) :: first, second
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: use_first
+
+      associate (usual => instance%values(first), special => instance%values(second))
+         use_first = .not. special%is_given
+         if (usual%is_given .and. special%is_given) then
+            if (usual%is_override .eqv. special%is_override) then
+               call raise(error, input_error, usual%place//': '//label(entries(first))//' cannot be combined with '// &
+                  label(entries(second))//'; give only one of them')
                return
             end if
-            use_special = special%is_override
+            use_first = usual%is_override
          end if
-         special%is_active = use_special
-         usual%is_active = .not. use_special
-         if (.not. use_special) special%reals = 0.0_wp
+         usual%is_active = use_first
+         special%is_active = .not. use_first
       end associate
-   end subroutine resolve_exclusive_entries
+   end subroutine choose_one
 
 end module polydem_exclusive_entries

@@ -7,6 +7,7 @@ module polydem_description
    use polydem_overlap_table, only: write_overlap_table
    use polydem_result_files, only: overlaps_name
    use polydem_run_duration, only: longest_run
+   use polydem_rigidity, only: describe_rigidity
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text, counted, join
    use polydem_scene_measures, only: scene_measures_t
@@ -42,6 +43,7 @@ contains
          if (allocated(measures%of_material)) call write_materials(simulation, measures%of_material, log)
          if (gravity_text(s) /= '' .and. s%law%rest_note() /= '') &
             call log%write_line('           note: '//s%law%rest_note())
+         call describe_rigidity(s, measures, log)
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
                              to_text(s%dt/s%expected_stable_step, 3)//' of the stable time step '// &
                              to_text(s%expected_stable_step)//' s estimated from the shapes')

@@ -8,6 +8,7 @@ module polydem_entry_warnings
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
+   use polydem_static_pressure, only: load_pressure
    use polydem_strings, only: text_t, to_text
    use polydem_wall_warnings, only: add, warn_of_copies, warn_of_pulls, warn_of_rows
    implicit none
@@ -193,20 +194,15 @@ contains
       type(simulation_t), intent(in) :: simulation
       type(scene_measures_t), intent(in) :: measures
       type(text_t), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: extent(2), width
-      integer :: axis, k
+      character(len=:), allocatable :: key
+      integer :: k
 
       associate (s => simulation%settings, law => simulation%law)
          do k = 1, size(s%load)
-            if (abs(s%load(k)%stress) > 0.0_wp) then
-               call weigh('load.'//s%load(k)%name, 'stress', '&load '//s%load(k)%name, abs(s%load(k)%stress))
-            else if (abs(s%load(k)%force) > 0.0_wp) then
-               axis = simulation%walls%loads(k)%direction
-               extent = simulation%walls%named%extent(simulation%walls%loads(k)%wall, 3 - axis, simulation%bodies)
-               width = extent(2) - extent(1)
-               if (width > 0.0_wp) call weigh('load.'//s%load(k)%name, 'force', '&load '//s%load(k)%name, &
-                                                abs(s%load(k)%force)/width)
-            end if
+            key = 'mass'
+            if (abs(s%load(k)%force) > 0.0_wp) key = 'force'
+            if (abs(s%load(k)%stress) > 0.0_wp) key = 'stress'
+            call weigh('load.'//s%load(k)%name, key, '&load '//s%load(k)%name, load_pressure(simulation, s%load(k), k))
          end do
          if (s%cell%obeys /= 'none') call weigh('cell', 'stress', '&cell', maxval(abs(s%cell%stress)))
          if (index(law%description, 'cohesion') > 0) call weigh('forces', 'cohesion', '&forces or &material', &

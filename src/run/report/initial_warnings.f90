@@ -119,7 +119,7 @@ contains
             'opening = '//to_text(scene%opening, 3)//' m is less than the diameter of the smallest grain, '// &
             to_text(measures%diameter(1), 3)//' m: hardly any grain flows out. Increase opening in &scene')
       end associate
-      if (measures%softness > softest) call add(warnings, &
+      if (measures%softness > softest .and. simulation%pressure%is_of_bodies) call add(warnings, &
          'the pressure under the full height of the free bodies is '//to_text(measures%softness, 3)// &
          ' of the least stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces or &material '// &
          '(with '//to_text(measures%stiffness*measures%softness/firm, 2)//' it is '//to_text(firm, 2)// &

@@ -62,8 +62,9 @@ module polydem_scene_measures
       integer(lp), allocatable :: of_material(:)
       !> Least stiffness of all pairs of materials [N/m2]
       real(wp) :: stiffness = 0.0_wp
-      !> Pressure under the full height of the free bodies, over that stiffness [1]
-      real(wp) :: softness = 0.0_wp
+      !> Greatest static pressure, and that of impacts at the expected speed: density times its square, over that
+      !> stiffness [1]
+      real(wp) :: softness = 0.0_wp, impact_softness = 0.0_wp
       !> Distance between neighbouring numbers at the farthest vertex of a free body from the origin [m]
       real(wp) :: last_bit = 0.0_wp
       !> Depth by which the lightest free body sinks into a body below it, and depth under the full height of the free
@@ -122,10 +123,11 @@ contains
             down = abs(s%settings%forces%gravity)/gravity
             measures%potential = gravity*measures%mass(3)*along(measures%extent)
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
-            measures%softness = measures%density(2)*gravity*along(measures%free_extent)/measures%stiffness
-            measures%static_depth = [measures%mass(1)*gravity/measures%stiffness, &
-                                     measures%softness*measures%diameter(2)]
+            measures%static_depth = [measures%mass(1)*gravity, measures%density(2)*gravity &
+                                     *along(measures%free_extent)*measures%diameter(2)]/measures%stiffness
          end if
+         measures%softness = s%pressure%greatest/measures%stiffness
+         measures%impact_softness = measures%density(2)*(s%expected%speed/measures%stiffness)*s%expected%speed
          measures%last_bit = spacing(maxval(abs(measures%free_extent)))
       end associate
       call find_stored_energy(simulation%comm, simulation%bodies, simulation%contacts, measures%stored)

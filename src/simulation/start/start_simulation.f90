@@ -20,6 +20,7 @@ module polydem_start_simulation
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_start_forces, only: start_forces
+   use polydem_static_pressure, only: choose_stiffness, find_static_pressure
    use polydem_strings, only: to_text
    implicit none
    private
@@ -61,6 +62,9 @@ contains
       call enter_cell(self, error)
       if (allocated(error)) return
       call prepare_stages(self%settings, self%stages)
+      call find_static_pressure(self)
+      call choose_stiffness(self, error)
+      if (allocated(error)) return
       call choose_methods(self, error)
       if (allocated(error)) return
       call draw_sample(self, sample, error)

@@ -1,0 +1,117 @@
+!> How near to rigid bodies a scene is: the least stiffness over its pressures, and what that means for its force law.
+!>
+!> The errors are fits c (P/E)^n to two problems with known rigid answers: the steepest slope on which a block of 1 x 4
+!> stands, where P is its weight over its width, and the velocity of a square after an elastic impact on its corner,
+!> where P is density times speed squared. `test_rigidity` measures them.
+module polydem_rigidity
+   use polydem_elementary, only: exponential, logarithm
+   use polydem_kinds, only: ip, wp
+   use polydem_log, only: log_t
+   use polydem_scene_measures, only: scene_measures_t
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: describe_rigidity, tipping_error, impact_error, share_text
+
+   !> Coefficient and exponent of the errors of a law
+   type :: fit_t
+      !> Name of the law, with which the description of the parts begins
+      character(len=21) :: name
+      !> Coefficient and exponent of tipping, (2)
+      real(wp) :: tipping(2)
+      !> Those of an impact on a corner, (2)
+      real(wp) :: impact(2)
+   end type fit_t
+
+   real(wp), parameter :: third = 1.0_wp/3.0_wp
+   !> Fits of all laws
+   type(fit_t), parameter :: fits(5) = [ &
+      fit_t('polar law', [9.7_wp, 1.0_wp], [3.35_wp, 0.5_wp]), &
+      fit_t('effective polar law', [8.4_wp, 1.0_wp], [3.2_wp, 0.5_wp]), &
+      fit_t('conservative law', [4.7_wp, 0.25_wp], [4.2_wp, 0.3_wp]), &
+      fit_t('area law', [5.45_wp, third], [2.7_wp, 0.45_wp]), &
+      fit_t('law of the own length', [4.4_wp, third], [2.1_wp, 0.44_wp])]
+
+contains
+
+   !> Write the stiffness over the static pressure and over that of impacts, with the errors to expect.
+   subroutine describe_rigidity(simulation, measures, log)
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+      type(scene_measures_t), intent(in) :: measures
+      type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: text
+
+      if (measures%free == 0_ip) return
+      associate (s => simulation, parts => simulation%law%description)
+         text = 'stiffness  E = '//to_text(measures%stiffness, 3)//' N/m2'
+         if (measures%softness > 0.0_wp) text = text//', '//to_text(1.0_wp/measures%softness, 2)// &
+            ' times the static pressure '//to_text(s%pressure%greatest, 2)//' N/m2 '//s%pressure%origin// &
+            ': faces '//to_text(measures%softness, 2)//' of a grain deep, error of tipping '// &
+            share_text(tipping_error(parts, measures%softness))
+         call log%write_line(text)
+         if (measures%impact_softness > 0.0_wp) call log%write_line('           '// &
+            to_text(1.0_wp/measures%impact_softness, 2)//' times the pressure of impacts at '// &
+            to_text(s%expected%speed, 3)//' m/s: error of an elastic impact on a corner '// &
+            share_text(impact_error(parts, measures%impact_softness)))
+      end associate
+   end subroutine describe_rigidity
+
+   !> Error of the tangent of the slope on which a block of 1 x 4 topples
+   pure real(wp) function tipping_error(parts, softness)
+      !> Description of the force law
+      character(len=*), intent(in) :: parts
+      !> Static pressure over stiffness
+      real(wp), intent(in) :: softness
+      integer :: k
+
+      tipping_error = 0.0_wp
+      do k = 1, size(fits)
+         if (index(parts, trim(fits(k)%name)) == 1) tipping_error = fitted(fits(k)%tipping, softness)
+      end do
+   end function tipping_error
+
+   !> Error of the velocity after an impact on a corner, over the speed of the impact
+   pure real(wp) function impact_error(parts, softness)
+      !> Description of the force law
+      character(len=*), intent(in) :: parts
+      !> Pressure of the impact over stiffness
+      real(wp), intent(in) :: softness
+      integer :: k
+
+      impact_error = 0.0_wp
+      do k = 1, size(fits)
+         if (index(parts, trim(fits(k)%name)) == 1) impact_error = fitted(fits(k)%impact, softness)
+      end do
+   end function impact_error
+
+   !> A coefficient times a power with a real exponent
+   pure real(wp) function fitted(fit, softness)
+      !> Coefficient and exponent, (2)
+      real(wp), intent(in) :: fit(2)
+      real(wp), intent(in) :: softness
+
+      fitted = fit(1)*exponential(fit(2)*logarithm(softness))
+   end function fitted
+
+   !> An error as text: in per cent with one digit
+   pure function share_text(error) result(text)
+      !> Error as a share
+      real(wp), intent(in) :: error
+      character(len=:), allocatable :: text
+
+      if (error > 1.0_wp) then
+         text = 'above 100 %, far from rigid'
+      else if (error >= 0.1_wp) then
+         text = 'about '//to_text(10_ip*nint(10.0_wp*error, ip))//' %'
+      else if (error >= 0.0095_wp) then
+         text = 'about '//to_text(nint(100.0_wp*error, ip))//' %'
+      else if (error >= 0.00095_wp) then
+         text = 'about 0.'//to_text(nint(1000.0_wp*error, ip))//' %'
+      else
+         text = 'about '//to_text(100.0_wp*error, 2)//' %'
+      end if
+   end function share_text
+
+end module polydem_rigidity
