@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from polydem_post import Frame
 from polydem_post.accuracy.estimate import (
     CONVERGED,
     FITTED,
@@ -14,6 +15,8 @@ from polydem_post.accuracy.estimate import (
     needs_separation,
     separated,
 )
+from polydem_post.accuracy.quantities import horizon, parse, usual_quantities
+from polydem_post.base.result_file import ResultError
 
 #: Rounding errors of the made-up values
 TINY = 1e-15
@@ -136,3 +139,82 @@ def test_without_an_order_in_dt_the_halves_are_in_doubt():
     integration = integrate({0.5: 1.001, 1.0: 1.002}, TINY)
     values, doubt = separated({4.0: (1.2, 1.19), 16.0: (1.1, 1.095)}, integration)
     assert values == {4.0: 1.19, 16.0: 1.095} and doubt == pytest.approx(0.01)
+
+
+# --- quantities --------------------------------------------------------------------------------------------------
+
+
+class Run(list):
+    """Frames that stand for a trajectory, with columns of a series."""
+
+    balance_units = {"kinetic": "J/m"}
+    time_series_units = {"kinetic_energy": "J/m", "time": "s"}
+    energy_balance = {"kinetic": [0.0, 4.0, -6.0]}
+    time_series = {"kinetic_energy": [math.nan, 1.0, 3.0], "time": [0.0, 1.0, 2.0]}
+    settings = {"sink": {"bin": None}}
+
+
+def run_of(*places, number=1):
+    """A run in which squares of side 2 are at these places, and turn as far as they are high."""
+    square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+    frames = Run()
+    for time, place in enumerate(places):
+        outlines = [[(x + place[0] + 9.0 * k, y + place[1]) for x, y in square] for k in range(number)]
+        frame = Frame.from_polygons(outlines, velocity=[place] * number, angular_velocity=[place[1]] * number,
+                                    time=float(time), density=1.0)
+        object.__setattr__(frame, "angle", frame.angle + place[1])
+        frames.append(frame)
+    return frames
+
+
+def value_and_scale(word, run):
+    quantity = parse(word, run)
+    return quantity.value(run), quantity.scale(run)
+
+
+def test_quantities_of_bodies_have_the_scale_of_their_rim():
+    run = run_of((0.0, 0.0), (3.0, 4.0), (2.0, 1.0))
+    rim = math.sqrt(2.0) * 4.0
+    assert value_and_scale("body.1.x", run) == pytest.approx((2.0, rim))
+    assert value_and_scale("body.1.y", run) == pytest.approx((1.0, rim))
+    assert value_and_scale("body.1.angle", run) == pytest.approx((1.0, 4.0))
+    assert value_and_scale("body.1.vx", run) == pytest.approx((2.0, rim))
+    assert value_and_scale("body.1.spin", run) == pytest.approx((1.0, 4.0))
+    assert value_and_scale("body.1.x=0.5", run) == pytest.approx((2.0, 0.5))
+    several = run_of((0.0, 0.0), (3.0, 4.0), (2.0, 1.0), number=4)
+    assert value_and_scale("centre.y", several) == pytest.approx((1.0, 5.0))
+
+
+def test_columns_have_a_last_value_and_a_mean_without_what_is_not_a_number():
+    run = run_of((0.0, 0.0), (1.0, 0.0))
+    assert value_and_scale("kinetic_energy", run) == (3.0, 3.0)
+    assert value_and_scale("kinetic_energy:mean", run) == pytest.approx(((1.0 + 0.5 * 3.0) / 1.5, 3.0))
+    assert value_and_scale("kinetic", run) == (-6.0, 6.0)
+    assert value_and_scale("kinetic:mean", run) == pytest.approx((0.5, 6.0))
+
+
+def test_flow_counts_what_passes_a_line():
+    run = run_of((0.0, 1.0), (0.0, -1.0), (0.0, -3.0))
+    assert value_and_scale("flow:2,0,-2,0", run) == pytest.approx((-4.0, 4.0))
+    assert value_and_scale("flow:-2,0,2,0", run)[0] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("word", ["time", "kinetic:median", "body.2.x", "body.1.z", "centre.angle", "flow:0,0,1",
+                                  "body.1.x=0", "body.1.x=-1", "body.1.x=nan"])
+def test_what_is_no_quantity_is_an_error(word):
+    with pytest.raises(ResultError, match="--quantity"):
+        parse(word, run_of((0.0, 0.0), (1.0, 0.0)))
+
+
+def test_usual_quantities_are_those_of_few_bodies_or_of_all():
+    assert usual_quantities(run_of((0.0, 0.0))) == ["body.1.x", "body.1.y", "body.1.angle"]
+    assert usual_quantities(run_of((0.0, 0.0), number=4)) == ["centre.x", "centre.y", "kinetic_energy:mean", "bin.mass"]
+
+
+def test_the_horizon_is_the_last_frame_before_bodies_differ():
+    run = run_of((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))
+    near = run_of((0.0, 0.0), (1.02, 0.0), (2.2, 0.0))
+    diameter = 2.0 * math.sqrt(2.0)
+    assert horizon(run, [run, near], 0.3 / diameter) is None
+    assert horizon(run, [run, near], 0.1 / diameter) == 1.0
+    assert horizon(run, [near], 0.01 / diameter) == 0.0

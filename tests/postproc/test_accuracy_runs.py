@@ -36,8 +36,8 @@ MATERIALS = """&scene wall_material = 'steel' /
 """
 
 #: A tilted block has just left a floor with soft contacts, and is still in touch with stiffer ones turned the other way
-IMPACT = """&grains name = 'one' region = 'at' at = 0, 0.00685 shape = 'rectangle' width = 0.01 height = 0.01 angle = 30, 30
-   velocity = 0, -0.2 /
+IMPACT = """&grains name = 'one' region = 'at' at = 0, 0.00685 shape = 'rectangle' width = 0.01 height = 0.01
+   angle = 30, 30 velocity = 0, -0.2 /
 &wall name = 'floor' outline = 'line' from = -0.1, 0 to = 0.1, 0 thickness = 0.01 /
 &forces law = 'conservative' stiffness = 2e7 /
 &integrate duration = 4e-3 /

@@ -3,7 +3,8 @@
 All numbers are shares of the scale of the quantity. Steps and stiffnesses are factors of those of the scene.
 
 Integration error. Values at three steps 2 dt, dt, dt/2 give the order m = log2((q(2 dt) - q(dt))/(q(dt) - q(dt/2)))
-(L.F. Richardson & J.A. Gaunt, Phil. Trans. R. Soc. A 226 (1927) 299). Where they give none, the error is that of order 1.
+(L.F. Richardson & J.A. Gaunt, Phil. Trans. R. Soc. A 226 (1927) 299). Where they give none, the error is that of
+order 1.
 
 Distance from infinite stiffness. Values at E, 4 E and 16 E at an equal share of the stable step give the order
 p = log4((q(E) - q(4 E))/(q(4 E) - q(16 E))) and the limit. The limit that E/4, E and 4 E give differs from it by what

@@ -89,8 +89,10 @@ def usual_quantities(run: Trajectory) -> list[str]:
 
 
 def horizon(run: Trajectory, others: list[Trajectory], tolerance: float) -> float | None:
-    """Last time [s] of a frame up to which no free body is further from itself in other windows than the tolerance
-    times its diameter; None: the last frame."""
+    """Time of the last frame before free bodies differ between windows [s]; None: they do not.
+
+    They differ if one is further from itself in another window than the tolerance times its diameter.
+    """
     before = 0.0
     for number, frame in enumerate(run):
         for other in others:

@@ -93,7 +93,8 @@ def write_scene(namelist: Path, checked: Checked, folder: Path, window: float, r
             raise ResultError(f"{folder}: holds windows of another scene, or with other options; give another folder "
                               "with --output, or remove this one")
         path.write_text(text, encoding="utf-8")
-        copy_tables(namelist, [], folder)
+        if namelist.parent.resolve() != folder.resolve():
+            copy_tables(namelist, [], folder)
     except OSError as error:
         raise cannot_write(folder, error) from error
     return path

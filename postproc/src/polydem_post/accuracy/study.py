@@ -182,8 +182,8 @@ def _recommend(outcome: Outcome) -> None:
     stiffness = _rounded_up(max(found.stiffness(tolerance) for found in usable.values()))
     if stiffness > MOST:
         worst = max(usable, key=lambda name: usable[name].stiffness(tolerance))
-        outcome.reason = (f"{worst} would need about {stiffness:.1g} times the stiffness, beyond the {MOST:g} times for "
-                          "which fits are tested: take the extrapolated value, or another law")
+        outcome.reason = (f"{worst} would need about {stiffness:.1g} times the stiffness, beyond the {MOST:g} times "
+                          "for which fits are tested: take the extrapolated value, or another law")
         return
     steps = {step for step in (0.5, 1.0, *COARSE) if study.is_stable(Window(step=step)) or step <= 1.0}
     allowed = INTEGRATION_SHARE * tolerance
