@@ -67,20 +67,20 @@ def stack(draw):
 
 def pile(draw):
     """Grains fall into a cup."""
-    return (f"&grains name = 'grains' region = 'box' low = 0, 0.001 high = 0.05, 0.07 number = {draw.randint(12, 20)}"
+    return (f"&grains name = 'grains' region = 'box' low = 0, 0.001 high = 0.04, 0.055 number = {draw.randint(7, 10)}"
             f" seed = {draw.randint(1, 10**6)} /\n"
-            "&wall name = 'cup' outline = 'polyline' vertices = 0, 0.1, 0, 0, 0.05, 0, 0.05, 0.1 thickness = 0.01 /\n"
+            "&wall name = 'cup' outline = 'polyline' vertices = 0, 0.1, 0, 0, 0.04, 0, 0.04, 0.1 thickness = 0.01 /\n"
             f"&forces friction_coefficient = {draw.uniform(0.1, 0.5):.2f}"
             f" restitution = {draw.uniform(0.2, 0.6):.2f} /\n"
-            f"&integrate duration = {draw.uniform(0.08, 0.14):.3f} /\n", "centre.y", 2e-2)
+            f"&integrate duration = {draw.uniform(0.06, 0.1):.3f} /\n", "centre.y", 2e-2)
 
 
 def hopper(draw):
     """Grains flow out of a small silo."""
-    return (f"&scene name = 'hopper' bodies = {draw.randint(15, 25)} opening = {draw.uniform(0.03, 0.045):.3f}"
+    return (f"&scene name = 'hopper' bodies = {draw.randint(9, 14)} opening = {draw.uniform(0.03, 0.045):.3f}"
             f" slope = {draw.choice((30, 45, 60))} seed = {draw.randint(1, 10**6)} /\n"
             f"&forces friction_coefficient = {draw.uniform(0.1, 0.5):.2f} /\n"
-            f"&integrate duration = {draw.uniform(0.08, 0.14):.3f} /\n", "centre.y", 2e-2)
+            f"&integrate duration = {draw.uniform(0.06, 0.1):.3f} /\n", "centre.y", 2e-2)
 
 
 def gas(draw):
@@ -88,8 +88,8 @@ def gas(draw):
     return (f"&scene name = 'gas' bodies = {draw.randint(12, 25)} solid_fraction = {draw.uniform(0.15, 0.3):.2f}"
             f" speed = {draw.uniform(0.3, 1.0):.2f} seed = {draw.randint(1, 10**6)} /\n"
             f"&forces stiffness = 1e8 gravity = 0, 0 restitution = {draw.uniform(0.5, 0.9):.2f}"
-            f" friction_coefficient = {draw.choice((0.0, 0.3))} /\n&integrate duration = 0.02 /\n",
-            "kinetic_energy:mean", 2e-2)
+            f" friction_coefficient = {draw.choice((0.0, 0.3))} /\n&integrate duration = 0.008 /\n",
+            "kinetic_energy:mean", 3e-2)
 
 
 KINDS = (slide, impact, stack, pile, hopper, gas)

@@ -16,7 +16,7 @@ from ..sweep.batch import check_namelist, copy_tables
 SCENE, BODIES = "scene.nml", "start.h5"
 
 #: Rows of the series and frames of a window: at most, and one for so many steps
-MOST_ROWS, STEPS_PER_ROW = 64, 400
+MOST_ROWS, STEPS_PER_ROW = 64, 80
 LEAST_ROWS = 4
 
 #: The line of `check` that names the step, with its stable step

@@ -138,8 +138,10 @@ def _values(study: Study, quantity: Quantity, scale: float, windows: dict[float,
 
 
 def _first_estimate(study: Study, quantity: Quantity, scale: float, tolerance: float) -> Estimate:
+    if not math.isfinite(scale):
+        return Estimate(REFUSED, reason="it is not a number in the window of the scene")
     if not scale > 0.0:
-        return Estimate(CONSTANT, reason="it does not change")
+        return Estimate(CONSTANT, reason="it is zero in all of the window")
     steps = {step: Window(step=step) for step in (0.5, 1.0, *COARSE)}
     stiff = {factor: Window(stiffness=factor) for factor in (0.25, 1.0, 4.0, 16.0)}
     at_steps = _values(study, quantity, scale, steps)

@@ -21,7 +21,7 @@ def add_accuracy(verbs) -> None:
     accuracy.add_argument("--tolerance", type=arguments.positive, default=1e-2, metavar="X")
     accuracy.add_argument("--quantity", action="append", default=[], metavar="NAME")
     accuracy.add_argument("--duration", type=arguments.positive, metavar="T")
-    accuracy.add_argument("--start-from", default="", metavar="RESULT")
+    accuracy.add_argument("--start-from", metavar="RESULT")
     accuracy.add_argument("--set", action="append", default=[], dest="entries", metavar="GROUP.KEY=VALUE")
     accuracy.add_argument("--output", type=Path, metavar="FOLDER")
     accuracy.add_argument("--cores", type=arguments.count, metavar="N")
@@ -39,7 +39,7 @@ def _accuracy(options: argparse.Namespace) -> int:
         raise ResultError("--tolerance takes a number below 1, such as 1e-2")
     cores = options.cores or max(len(available_cores()), options.threads)
     request = Request(options.namelist, options.program, options.tolerance, tuple(options.quantity), options.duration,
-                      options.start_from, tuple(options.entries), options.output, cores, options.threads)
+                      options.start_from or "", tuple(options.entries), options.output, cores, options.threads)
     outcome = study_accuracy(request, arguments.say)
     for line in lines_of(outcome):
         arguments.say(line)
