@@ -13,6 +13,7 @@ from polydem_post.accuracy.estimate import (
     estimate,
     integrate,
     needs_separation,
+    noise_of,
     separated,
 )
 from polydem_post.accuracy.quantities import horizon, parse, usual_quantities
@@ -107,6 +108,13 @@ def test_small_differences_need_no_order():
     assert bound(values, 1.0, TINY) == pytest.approx(2e-4 / (1.0 - 4.0**-0.15))
     assert found.stiffness(1e-2) == 1.0
     assert found.stiffness(5e-2) == 0.25
+
+
+def test_noise_is_the_spread_of_last_bits_or_what_is_not_smooth_in_the_stiffness():
+    assert noise_of(1.0, [1.0 + 3e-6, 1.0 - 1e-6], [1.01, 0.99]) == pytest.approx(4e-6)
+    assert noise_of(1.0, [1.0, 1.0], [1.01, 1.02]) == pytest.approx(3e-2)
+    smooth = [1.0 + 0.05 * factor**-0.5 for factor in (1.0, 1.03, 1.0 / 1.03)]
+    assert noise_of(smooth[0], [], smooth[1:]) < 5e-5
 
 
 def test_noise_is_never_fitted():

@@ -157,7 +157,7 @@ def test_a_crowd_of_collisions_is_noise_beyond_a_horizon(tmp_path, capsys):
     path.write_text(CROWD, encoding="utf-8")
     assert call(path, "--output", tmp_path / "out", "--quantity", "body.1.x", "--quantity", "body.2.y") == 1
     said = capsys.readouterr().out
-    assert "below the noise: windows that differ in last bits differ by" in said
+    assert "below the noise: windows that differ in last bits, or by 3 % of the stiffness, differ by" in said
     assert "when last bits" in said and "in all of the window" not in said
     assert "entries    none keep the tolerance 0.01: no quantity has an estimate" in said
     rows = list(csv.DictReader((tmp_path / "out" / "accuracy.csv").open(encoding="utf-8")))

@@ -67,20 +67,20 @@ def stack(draw):
 
 def pile(draw):
     """Grains fall into a cup."""
-    return (f"&grains name = 'grains' region = 'box' low = 0, 0.001 high = 0.04, 0.055 number = {draw.randint(7, 10)}"
+    return (f"&grains name = 'grains' region = 'box' low = 0, 0.001 high = 0.05, 0.07 number = {draw.randint(14, 20)}"
             f" seed = {draw.randint(1, 10**6)} /\n"
-            "&wall name = 'cup' outline = 'polyline' vertices = 0, 0.1, 0, 0, 0.04, 0, 0.04, 0.1 thickness = 0.01 /\n"
+            "&wall name = 'cup' outline = 'polyline' vertices = 0, 0.1, 0, 0, 0.05, 0, 0.05, 0.1 thickness = 0.01 /\n"
             f"&forces friction_coefficient = {draw.uniform(0.1, 0.5):.2f}"
-            f" restitution = {draw.uniform(0.2, 0.6):.2f} /\n"
-            f"&integrate duration = {draw.uniform(0.06, 0.1):.3f} /\n", "centre.y", 2e-2)
+            f" restitution = {draw.uniform(0.2, 0.4):.2f} /\n"
+            f"&integrate duration = {draw.uniform(0.05, 0.07):.3f} /\n", "centre.y", 2e-2)
 
 
 def hopper(draw):
     """Grains flow out of a small silo."""
-    return (f"&scene name = 'hopper' bodies = {draw.randint(9, 14)} opening = {draw.uniform(0.03, 0.045):.3f}"
+    return (f"&scene name = 'hopper' bodies = {draw.randint(15, 25)} opening = {draw.uniform(0.03, 0.045):.3f}"
             f" slope = {draw.choice((30, 45, 60))} seed = {draw.randint(1, 10**6)} /\n"
-            f"&forces friction_coefficient = {draw.uniform(0.1, 0.5):.2f} /\n"
-            f"&integrate duration = {draw.uniform(0.06, 0.1):.3f} /\n", "centre.y", 2e-2)
+            f"&forces friction_coefficient = {draw.uniform(0.1, 0.5):.2f} restitution = 0.3 /\n"
+            f"&integrate duration = {draw.uniform(0.05, 0.07):.3f} /\n", "centre.y", 2e-2)
 
 
 def gas(draw):

@@ -26,7 +26,7 @@ LEAST_STEP_ORDER, GREATEST_STEP_ORDER, UNKNOWN_STEP_ORDER = 0.7, 4.5, 1.0
 #: of the distance may have all of it
 INTEGRATION_SHARE, DISTANCE_SHARE, BOUND_SHARE = 1.0 / 3.0, 0.5, 2.0 / 3.0
 
-#: A difference of two values below so many spreads of the perturbed windows is noise
+#: A difference of two values below so many times the noise is noise
 SPREADS = 2.0
 
 #: Differences of stiffness are not separated from integration errors below this share of them
@@ -73,6 +73,17 @@ class Integration:
         return 0.9 * finest * (allowed / self.error(finest)) ** (1.0 / order)
 
 
+def noise_of(value: float, changed: list[float], near: list[float]) -> float:
+    """What a value may be off without a reason that can be fitted.
+
+    It is the spread of windows that differ in last bits, or what the value lacks of the mean of those at stiffnesses
+    just above and below, times two: a smooth function of the stiffness lacks nothing. Where the order of collisions
+    depends on the stiffness the second is large long before last bits have grown.
+    """
+    spread = max([value, *changed]) - min([value, *changed])
+    return max(spread, abs(sum(near) - len(near) * value))
+
+
 def integrate(values: dict[float, float], noise: float) -> Integration:
     """Errors of integration from values at the steps 1/2 and 1 and at larger ones that could be run."""
     fine = values[1.0] - values[0.5]
@@ -92,7 +103,7 @@ class Estimate:
     state: str
     #: Why, if it is refused or below the noise
     reason: str = ""
-    #: Spread of the perturbed windows
+    #: See `noise_of`
     noise: float = 0.0
     integration: Integration | None = None
     #: Order in the stiffness, and the least one that the softer windows have, too; None: none was fitted
@@ -162,7 +173,7 @@ def estimate(values: dict[float, float], integration: Integration, noise: float,
     """
     found = Estimate(NOISE, noise=noise, integration=integration, values=values)
     if noise > INTEGRATION_SHARE * tolerance:
-        found.reason = f"windows that differ in last bits differ by {noise:.1e}"
+        found.reason = f"windows that differ in last bits, or by 3 % of the stiffness, differ by {noise:.1e}"
         return found
     if bound(values, 1.0, noise) + doubt <= BOUND_SHARE * tolerance:
         found.state, found.limit = CONVERGED, values[16.0]

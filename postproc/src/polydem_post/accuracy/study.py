@@ -18,11 +18,12 @@ from .estimate import (
     estimate,
     integrate,
     needs_separation,
+    noise_of,
     separated,
 )
 from .quantities import Quantity, horizon, parse, usual_quantities
 from .scene import check, window_of, write_scene, write_start
-from .windows import BASE, CHANGED, COARSE, NEEDED, TRIED, Study, Window
+from .windows import BASE, CHANGED, COARSE, NEAR, NEEDED, TRIED, Study, Window
 
 #: Folder of studies
 RESULTS = Path("results/accuracy")
@@ -91,7 +92,7 @@ def study_accuracy(request: Request, say: Callable[[str], None] = print) -> Outc
     base = study.result(BASE)
     words = request.quantities or tuple(usual_quantities(base))
     quantities = {quantity.name: quantity for quantity in (parse(word, base) for word in words)}
-    study.run([*NEEDED, *CHANGED], "needed")
+    study.run([*NEEDED, *CHANGED, *NEAR], "needed")
     study.run(TRIED, "tried")
     scales = {name: quantity.scale(base) for name, quantity in quantities.items()}
     estimates = {name: _first_estimate(study, quantity, scales[name], request.tolerance)
@@ -147,9 +148,10 @@ def _first_estimate(study: Study, quantity: Quantity, scale: float, tolerance: f
     at_steps = _values(study, quantity, scale, steps)
     values = _values(study, quantity, scale, stiff)
     changed = list(_values(study, quantity, scale, dict(enumerate(CHANGED))).values())
-    if not all(map(math.isfinite, [*at_steps.values(), *values.values(), *changed])):
+    near = list(_values(study, quantity, scale, dict(enumerate(NEAR))).values())
+    if not all(map(math.isfinite, [*at_steps.values(), *values.values(), *changed, *near])):
         return Estimate(REFUSED, reason="it is not a number in some window")
-    noise = max([values[1.0], *changed]) - min([values[1.0], *changed])
+    noise = noise_of(values[1.0], changed, near)
     return estimate(values, integrate(at_steps, noise), noise, tolerance)
 
 

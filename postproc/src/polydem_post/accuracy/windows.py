@@ -36,14 +36,18 @@ class Window:
     @property
     def name(self) -> str:
         """Name of its run."""
-        words = [f"E{self.stiffness:g}", f"dt{self.step:g}", self.scheme, f"bits{self.bits:+d}" if self.bits else ""]
+        words = [f"E{self.stiffness:.4g}", f"dt{self.step:g}", self.scheme, f"bits{self.bits:+d}" if self.bits else ""]
         return "_".join(filter(None, words))
 
 
 BASE = Window()
-#: Windows without which nothing can be said; those with changed last bits; those that may fail
+#: Factor of the stiffnesses beside that of the scene
+BESIDE = 1.03
+
+#: Windows without which nothing can be said; those with changed last bits, and beside; those that may fail
 NEEDED = (Window(step=0.5), Window(stiffness=4.0), Window(stiffness=16.0))
 CHANGED = (Window(bits=1), Window(bits=-1))
+NEAR = (Window(stiffness=BESIDE), Window(stiffness=1.0 / BESIDE))
 TRIED = (Window(stiffness=0.25), *(Window(step=step) for step in COARSE))
 
 
@@ -92,7 +96,7 @@ class Study:
         grid = int(max(COARSE)) * self.rows
         base = grid * max(1, math.ceil(self.duration / self.checked.dt / grid - 1e-6))
         ratio = self.checked.stable / self.stable(window.stiffness)
-        if window.stiffness == 1.0:
+        if window.stiffness == 1.0 or window in NEAR:
             ratio = 1.0
         stiff = 2 * self.rows * math.ceil(base * ratio / (2 * self.rows) - 1e-6)
         return max(self.rows, round(stiff / window.step))
@@ -120,7 +124,7 @@ class Study:
         for window, run in zip(windows, sweep.runs):
             if state_of(run) == FINISHED:
                 self.runs[window] = run
-            elif window in (BASE, *NEEDED, *CHANGED):
+            elif window in (BASE, *NEEDED, *CHANGED, *NEAR):
                 raise ResultError(f"the window {run.name} failed: {last_words(run)}")
 
     def _say_progress(self, line: str) -> None:
