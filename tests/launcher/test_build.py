@@ -47,7 +47,7 @@ class Build(Toy):
         self.assertEqual((code, output), (1, f"<B9>\n{exact} --behind\n"))
         self.assertEqual(self.call("verify", "B0", "exact")[:2], (2, "<B0>\n"))
 
-    def test_a_sweep_knows_the_program(self):
+    def test_sweep_and_accuracy_know_the_program(self):
         self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
         os.chmod(os.path.join(self.folder, ".venv/bin/python"), 0o755)
         program = os.path.join(self.folder, "build/release/src/app/polydem")
@@ -55,6 +55,9 @@ class Build(Toy):
         self.assertEqual((code, os.path.exists(program)), (0, True))
         words = ["-m", "polydem_post", "sweep", "--program", program, "run", "my sweep", "--cores", "2"]
         self.assertEqual(output, "".join(f"<{word}>\n" for word in words))
+        code, output, _ = self.call("accuracy", "my scene.nml", "--tolerance", "1e-3")
+        words = ["-m", "polydem_post", "accuracy", "--program", program, "my scene.nml", "--tolerance", "1e-3"]
+        self.assertEqual((code, output), (0, "".join(f"<{word}>\n" for word in words)))
 
     def test_a_changed_source_is_built_and_an_error_shown(self):
         self.call("--version")

@@ -11,7 +11,6 @@ import hashlib
 import io
 import math
 import os
-import re
 import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +20,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from polydem_post.base.result_file import ResultError, cannot_read, insist_on_file
+from polydem_post.read.stable_share import stable_share
 from polydem_post.read.trajectory import Trajectory
 
 from .scenes import INPUTS, SCENES, Model, Scene, last_frame
@@ -310,14 +310,6 @@ def seconds_of_steps(path: Path) -> float:
         times = file["steps/stage"][:][:, kept].sum(axis=1)
     later = times[1:] if len(times) > 1 else times
     return float(later[later <= INTERRUPTED * np.median(later)].mean() * len(times))
-
-
-def stable_share(path: Path) -> float:
-    """Greatest ratio of dt to the stable time step of the contacts, from the log of a run; NaN without contacts."""
-    # Older logs use the second wording.
-    found = re.search(r"(?:max dt / stable dt|greatest share of the stable step) of the contacts: *(\S+)",
-                      path.read_text(encoding="utf-8"))
-    return float(found.group(1)) if found else float("nan")
 
 
 def _call(program: Path, namelist: Path, overrides: list) -> tuple:

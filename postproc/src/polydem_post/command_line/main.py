@@ -20,6 +20,7 @@ from .. import __version__
 from ..base import interrupts
 from ..base.emit import printable
 from ..base.result_file import ResultError, is_refused, reason
+from .accuracy_verb import add_accuracy
 from .data_verbs import add_data_verbs
 from .picture_verbs import add_picture_verbs
 from .sweep_verb import add_sweep
@@ -157,6 +158,7 @@ def _parser(words: list[str]) -> argparse.ArgumentParser:
     add_picture_verbs(verbs)
     add_data_verbs(verbs)
     add_sweep(verbs)
+    add_accuracy(verbs)
     laboratory = sorted(path.stem for path in LAB_HELP.glob("*.txt"))
     if not set(laboratory).isdisjoint(words):
         import_module(LAB).add_verbs(verbs)

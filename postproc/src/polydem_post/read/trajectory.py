@@ -431,7 +431,7 @@ class Trajectory:
         """Which bodies the stored namelist moves, (n): all fixed ones, or those that a motion lists."""
         scene = self.settings.scene
         bodies = {"id": frame.id, "fixed": frame.fixed, **self._bodies[1]}
-        walls = _wall_bodies(self.settings, bodies["id"][bodies["fixed"]])
+        walls = wall_bodies(self.settings, bodies["id"][bodies["fixed"]])
         chosen = [walls[motion["wall"]] if motion.get("wall") else motion.get("bodies")
                   for motion in self.settings.get("motion", {}).values()]
         chosen += [walls[load["wall"]] for load in self.settings.get("load", {}).values()]
@@ -446,7 +446,7 @@ class Trajectory:
         return self.origin if self._shift is None else (0.0, 0.0)
 
 
-def _wall_bodies(settings: Settings, ids: npt.NDArray[Any]) -> dict[str, Any]:
+def wall_bodies(settings: Settings, ids: npt.NDArray[Any]) -> dict[str, Any]:
     """Identifiers of the bodies of each group &wall: the last fixed ones, wall after wall, or those it lists."""
     counts = {}
     for name, wall in settings.get("wall", {}).items():

@@ -24,7 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..base.result_file import ResultError, cannot_read, cannot_write, insist_on_file
+from ..base.result_file import ResultError, cannot_read, cannot_write, insist_on_file, reason
 
 TABLE, RUNS = "table.csv", "runs"
 INPUT, OVERRIDES, ATTEMPTS, OUTPUT, RESULT = "input.nml", "overrides.txt", "attempts.csv", "output.txt", "result"
@@ -302,6 +302,12 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
     raise_all(problems)
     overrides = [[f"{column}={value}" for column, value in zip(columns, row.values) if value] for row in rows]
     raise_all([*problems_of_names(rows), *_problems_of_rows(base, program, rows, overrides, cores)])
+    return lay_out(base, folder, columns, rows)
+
+
+def lay_out(base: Path, folder: Path, columns: list[str], rows: list[Row]) -> Sweep:
+    """Make the folder of a sweep of rows that need no check."""
+    overrides = [[f"{column}={value}" for column, value in zip(columns, row.values) if value] for row in rows]
     new = folder.with_name(folder.name + ".unfinished")
     try:
         if new.exists():
@@ -311,7 +317,7 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
             place.mkdir(parents=True)
             shutil.copyfile(base, place / INPUT)
             (place / OVERRIDES).write_text("".join(f"{entry}\n" for entry in entries), encoding="utf-8")
-            _copy_tables(base, entries, place)
+            copy_tables(base, entries, place)
         with (new / TABLE).open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([NAME, *columns])
@@ -322,7 +328,7 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
     return Sweep(folder)
 
 
-def _copy_tables(base: Path, entries: list[str], place: Path) -> None:
+def copy_tables(base: Path, entries: list[str], place: Path) -> None:
     """Copy the tables of motions: the program looks for them in the folder of the namelist."""
     text = "\n".join([base.read_text(encoding="utf-8", errors="replace"), *entries])
     for name in {found.strip() for found in TABLE_OF_MOTION.findall(re.sub("!.*", "", text))}:
@@ -331,23 +337,29 @@ def _copy_tables(base: Path, entries: list[str], place: Path) -> None:
             shutil.copyfile(base.parent / name, place / name)
 
 
+def check_namelist(program: Path, base: Path, entries: list[str]) -> tuple[str, str]:
+    """What the program finds wrong with a namelist and some entries, empty if it can run, and what it prints of it."""
+    command = [str(program), "check", str(base), "--threads", "1"]
+    for entry in entries:
+        command += ["--set", entry]
+    try:
+        answer = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+                                check=False)
+    except OSError as error:
+        raise ResultError(f"{program}: cannot be run ({reason(error)})") from error
+    if answer.returncode == 0:
+        return "", answer.stdout
+    said = [line for line in answer.stderr.splitlines() if line.strip()]
+    problem = said[-1].replace("polydem: ", "", 1) if said else f"check ended with exit code {answer.returncode}"
+    return problem, answer.stdout
+
+
 def _problems_of_rows(base: Path, program: Path, rows: list[Row], overrides: list[list[str]], cores: int) -> list[str]:
     """Let the program check the namelist with the entries of every row. It names one wrong entry at a time."""
 
-    def problem(entries: list[str]) -> str:
-        command = [str(program), "check", str(base), "--threads", "1"]
-        for entry in entries:
-            command += ["--set", entry]
-        answer = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                                text=True, errors="replace", check=False)
-        if answer.returncode == 0:
-            return ""
-        said = [line for line in answer.stderr.splitlines() if line.strip()]
-        return said[-1].replace("polydem: ", "", 1) if said else f"check ended with exit code {answer.returncode}"
-
     def all_problems(entries: list[str]) -> list[str]:
         found: list[str] = []
-        while said := problem(entries):
+        while said := check_namelist(program, base, entries)[0]:
             found.append(said)
             others = [entry for entry in entries if not said.startswith(f"--set {entry}: ")]
             if len(others) == len(entries):
