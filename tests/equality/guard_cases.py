@@ -332,6 +332,8 @@ def base_of(entry, base):
     """Settings without what excludes an entry, and with what its group needs."""
     if entry.name == "scene.motion" or entry.name.startswith("motion."):
         base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
+    if entry.name == "forces.stiffness_over_pressure":
+        base = {key: value for key, value in base.items() if key != "forces.stiffness"}
     if entry.name.startswith("stage."):
         del base["integrate.duration"]
         base.setdefault(f"stage.{NAME}.until", "duration")
