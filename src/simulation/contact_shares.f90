@@ -138,9 +138,7 @@ contains
          end associate
       end do
       !$omp end parallel do
-      do k = 1_ip, m
-         shares%joins = shares%joins .or. shares%new(k)%is_joined
-      end do
+      shares%joins = any(shares%new(:m)%is_joined)
    end subroutine join_groups
 
    !> Keep what became of the contacts of one group.
@@ -162,15 +160,12 @@ contains
    subroutine reserve_loops(n, shares)
       integer(ip), intent(in) :: n
       type(contact_shares_t), intent(inout) :: shares
-      integer(ip) :: room
 
-      room = n
       if (allocated(shares%loops)) then
          if (size(shares%loops) >= n) return
-         room = max(2_ip*size(shares%loops, kind=ip), n)
          deallocate (shares%loops, shares%new)
       end if
-      allocate (shares%loops(room), shares%new(room))
+      allocate (shares%loops(n + n/2_ip), shares%new(n + n/2_ip))
    end subroutine reserve_loops
 
    !> Find some listed contacts, at most a block.
