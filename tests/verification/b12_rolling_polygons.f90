@@ -45,16 +45,12 @@ contains
       do k = 1, size(corners)
          call compare(table, corners(k), slopes(k), 'on supports', 0.01_wp, 1.0e9_wp, 40.0_wp, .true.)
       end do
-      do k = 1, size(corners)
-         call compare(table, corners(k), slopes(k), 'on supports, default law, E = 1e8', 0.01_wp, 1.0e8_wp, 0.0_wp, &
-                      .true.)
-      end do
       call compare(table, 5, 15.0_wp, 'on supports three times as wide', 0.03_wp, 1.0e9_wp, 20.0_wp, .false.)
       call compare(table, 8, 15.0_wp, 'on a plane', 0.5_wp, 1.0e9_wp, 2.0_wp, .false.)
       call stop_square(table)
    end subroutine run_rolling_polygons
 
-   !> Compare one polygon. The damping 0 stands for the default law with a small restitution. `under` is the length of a support under a face, as a share of the face; one half is a plane.
+   !> Compare one polygon. `under` is the length of a support under a face, as a share of the face; one half is a plane.
    subroutine compare(table, n, degrees, floor, under, young, damping, must_hold)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n
@@ -145,15 +141,9 @@ contains
          place = (real(k, wp) + 0.5_wp)*face*downhill - 0.5_wp*thickness*up
          call list%append(block_at(place(1), place(2), 2.0_wp*under*face, thickness, -slope), fixed=.true.)
       end do
-      if (damping > 0.0_wp) then
-         call begin('&forces friction_coefficient = 5 tangential_damping = 5 damping_coefficient = '// &
-                    to_text(damping)//area_law//' stiffness = '//to_text(young)//' /'// &
-                    integrate_text(1.0e-6_wp*sqrt(1.0e9_wp/young)), list, simulation, error)
-      else
-         call begin('&forces friction_coefficient = 5 tangential_damping = 1 restitution = 0.01 stiffness = '// &
-                    to_text(young)//' / &integrate duration = 1000 speed = 1 / &output energy_balance = .false. /', &
-                    list, simulation, error)
-      end if
+      call begin('&forces friction_coefficient = 5 tangential_damping = 5 damping_coefficient = '// &
+                 to_text(damping)//area_law//' stiffness = '//to_text(young)//' /'// &
+                         integrate_text(1.0e-6_wp*sqrt(1.0e9_wp/young)), list, simulation, error)
    end subroutine put_on_slope
 
    !> Ratio of the rate after an impact to the rate before it
