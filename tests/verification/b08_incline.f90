@@ -8,14 +8,19 @@
 !> by t = 2 A/(9 s^2), which moves the weight towards the edge: s = s_0 - h t/2, s_0 = (w - h tan a)/2. Both equations
 !> have a solution if s_0^3 > 3 h A/4. So the block topples at tan a = (w - 2 (3 h A/4)^(1/3))/h, which tends to w/h
 !> only with E^(-1/3).
+!>
+!> With the default law the force of an edge passes through its tip and is 0.375 E d, so the block topples about the tip
+!> like a rigid one. Before, it tilts until only the tip is inside, by d/w with d = rho g w h cos(a)/(0.375 E): tan a is
+!> too small by the share rho g h (1 + (w/h)^2)^(1/2) h/(0.375 E w), of first order in 1/E.
 module b08_incline
    use outlines, only: gravity, integrate_text
+   use slow_load, only: load_slowly, slow_integration
    use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_contact_history, only: column_of
    use polydem_errors, only: error_t
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    implicit none
@@ -46,6 +51,11 @@ contains
       call rest_exactly(table, merge(500000, 50000, thorough))
       call topple(table, 1.0e7_wp)
       if (thorough) call topple(table, 1.0e9_wp)
+      call topple_slowly(table, [1.0e5_wp, 1.0e6_wp])
+      if (.not. thorough) return
+      call topple_slowly(table, [1.0e6_wp, 1.0e7_wp])
+      call topple_softly(table, 'conservative')
+      call topple_softly(table, 'area')
    end subroutine run_incline
 
    subroutine slide(table, slope, friction)
@@ -158,6 +168,74 @@ contains
       end subroutine turn_within
 
    end subroutine topple
+
+   !> Compare the tangent at which the same block topples with the default law, when gravity rises slowly.
+   subroutine topple_slowly(table, young)
+      type(table_t), intent(inout) :: table
+      real(wp), intent(in) :: young(2)
+      real(wp) :: expected, deficit(2)
+      real(wp), parameter :: size(2) = [0.01_wp, 0.04_wp]
+      integer :: e
+      character(len=*), parameter :: name = 'h/w = 4, default law, error of the toppling tangent, '
+
+      do e = 1, 2
+         expected = density*size(2)*gravity/(0.375_wp*young(e))*hypot(size(1), size(2))/size(1)
+         call find_deficit(table, '', young(e), [-0.5_wp, 2.0_wp]*expected, deficit(e))
+         call table%expect_relative(name//'E = '//to_text(young(e), 1), expected, deficit(e), 0.2_wp)
+      end do
+      call table%expect_least(name//'order in E from '//to_text(young(1), 1), 0.9_wp, &
+                              log(deficit(1)/deficit(2))/log(young(2)/young(1)))
+   end subroutine topple_slowly
+
+   !> Show the same error of a law whose edges give way.
+   subroutine topple_softly(table, law)
+      type(table_t), intent(inout) :: table
+      character(len=*), intent(in) :: law
+      real(wp) :: deficit
+      integer :: e
+
+      do e = 6, 7
+         call find_deficit(table, 'law = '''//law//'''', 10.0_wp**e, [0.0_wp, 1.0_wp], deficit)
+         call table%show('h/w = 4, '//law//' law, error of the toppling tangent, E = '//to_text(10.0_wp**e, 1), deficit)
+      end do
+   end subroutine topple_softly
+
+   !> Find by how much the tangent at which a block topples is below that of a rigid one, relative to it.
+   subroutine find_deficit(table, entries, young, range, deficit)
+      type(table_t), intent(inout) :: table
+      !> Entries of &forces
+      character(len=*), intent(in) :: entries
+      real(wp), intent(in) :: young
+      !> Least and greatest value that is tried
+      real(wp), intent(in) :: range(2)
+      real(wp), intent(out) :: deficit
+      real(wp), parameter :: size(2) = [0.01_wp, 0.04_wp], limit = 0.005_wp
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      type(body_list_t) :: list
+      real(wp) :: least, greatest, tangent, moved
+      integer :: k
+
+      call list%append(block_at(0.0_wp, -0.5_wp*thickness, 0.5_wp, thickness, 0.0_wp), fixed=.true.)
+      call list%append(block_at(0.0_wp, 0.5_wp*size(2), size(1), size(2), 0.0_wp))
+      least = range(1)
+      greatest = range(2)
+      do k = 1, 8
+         deficit = 0.5_wp*(least + greatest)
+         tangent = (1.0_wp - deficit)*size(1)/size(2)
+         call begin('&forces friction_coefficient = 1 '//entries//' stiffness = '//to_text(young)//' /'// &
+                    slow_integration, list, simulation, error)
+         call load_slowly(simulation, gravity/sqrt(1.0_wp + tangent**2)*[tangent, -1.0_wp], 0.5_wp, 1.0_wp, 2_ip, &
+                          limit, moved, error)
+         call table%note_error(error)
+         if (allocated(error)) return
+         if (moved > limit) then
+            least = deficit
+         else
+            greatest = deficit
+         end if
+      end do
+   end subroutine find_deficit
 
    !> Area of the overlap that carries the weight of a block that is about to topple, A = m g l/E [m2]
    pure real(wp) function overlap_area(size, young)

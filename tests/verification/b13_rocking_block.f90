@@ -39,23 +39,30 @@ contains
       logical, intent(in) :: thorough
 
       call table%begin('B13', 'a block rocks: h = 10 cm, b = 2 cm, from half the toppling angle')
-      call rock(table, 'on a plane, E = 1e10: ', 0.5_wp*width, 1.0e10_wp, 1.0_wp, .false.)
-      if (thorough) call rock(table, 'on supports, E = 1e9: ', 0.01_wp*width, 1.0e9_wp, 150.0_wp, .false.)
-      call rock(table, 'on supports, E = 1e10: ', 0.01_wp*width, 1.0e10_wp, 150.0_wp, .true.)
+      call rock(table, 'on a plane, E = 1e10: ', 0.5_wp*width, with_area(1.0e10_wp, 1.0_wp), .false.)
+      if (thorough) call rock(table, 'on supports, E = 1e9: ', 0.01_wp*width, with_area(1.0e9_wp, 150.0_wp), &
+                              .false.)
+      call rock(table, 'on supports, E = 1e10: ', 0.01_wp*width, with_area(1.0e10_wp, 150.0_wp), .true.)
+      call rock(table, 'on supports, default law, E = 1e7: ', 0.01_wp*width, with_default(1.0e7_wp), .false.)
+      call rock(table, 'on supports, default law, E = 1e8: ', 0.01_wp*width, with_default(1.0e8_wp), .true.)
+      call rock(table, 'on a plane, default law, E = 1e8: ', 0.5_wp*width, with_default(1.0e8_wp), .false.)
+      if (thorough) call rock(table, 'on a plane, default law, E = 1e9: ', 0.5_wp*width, with_default(1.0e9_wp), .false.)
    end subroutine run_rocking_block
 
    !> Compare one fall. `under` is the length of a support under the block [m].
-   subroutine rock(table, name, under, young, damping, must_hold)
+   subroutine rock(table, name, under, forces, must_hold)
       type(table_t), intent(inout) :: table
       character(len=*), intent(in) :: name
-      real(wp), intent(in) :: under, young, damping
+      real(wp), intent(in) :: under
+      !> Groups of the namelist
+      character(len=*), intent(in) :: forces
       logical, intent(in) :: must_hold
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       real(wp) :: time, tilt, ratio
       logical :: has_fallen
 
-      call put_on_corner(under, young, damping, simulation, error)
+      call put_on_corner(under, forces, simulation, error)
       time = 0.0_wp
       tilt = 0.0_wp
       has_fallen = .false.
@@ -83,9 +90,28 @@ contains
       end if
    end subroutine rock
 
+   !> Area law with a damping coefficient
+   function with_area(young, damping) result(text)
+      real(wp), intent(in) :: young, damping
+      character(len=:), allocatable :: text
+
+      text = '&forces friction_coefficient = 5 damping_coefficient = '//to_text(damping)//area_law//' stiffness = '// &
+             to_text(young)//' /'//integrate_text(1.0e-6_wp*sqrt(1.0e10_wp/young))
+   end function with_area
+
+   !> Default law, with a restitution near that of a plastic impact
+   function with_default(young) result(text)
+      real(wp), intent(in) :: young
+      character(len=:), allocatable :: text
+
+      text = '&forces friction_coefficient = 5 restitution = 0.01 stiffness = '//to_text(young)// &
+             ' / &integrate duration = 1000 speed = 0.5 / &output energy_balance = .false. /'
+   end function with_default
+
    !> A block that stands on its left corner, tilted to the left.
-   subroutine put_on_corner(under, young, damping, simulation, error)
-      real(wp), intent(in) :: under, young, damping
+   subroutine put_on_corner(under, forces, simulation, error)
+      real(wp), intent(in) :: under
+      character(len=*), intent(in) :: forces
       type(simulation_t), intent(out) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       type(body_list_t) :: list
@@ -94,9 +120,7 @@ contains
                        start))
       call list%append(block_at(under - 0.5_wp*width, -0.05_wp, width, 0.1_wp, 0.0_wp), fixed=.true.)
       call list%append(block_at(1.5_wp*width - under, -0.05_wp, width, 0.1_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 5 damping_coefficient = '//to_text(damping)//area_law// &
-                 ' stiffness = '// &
-                 to_text(young)//' /'//integrate_text(1.0e-6_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
+      call begin(forces, list, simulation, error)
    end subroutine put_on_corner
 
    !> Time from rest to flat [s]. The substitution t = t0 (1 - u^2) removes the singularity; then the midpoint rule.

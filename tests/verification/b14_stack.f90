@@ -7,7 +7,8 @@
 !> A face that tilts by t shifts the centroid of its overlap by w^2 t/(12 d). Its restoring moment is E w^2 t/12 under
 !> any load. So a stack is a column of bending stiffness B = E w^3/12 under its own weight q = rho g w per height. It
 !> buckles at the height (7.837 B/q)^(1/3) (A.G. Greenhill, Proc. Camb. Phil. Soc. 4 (1881) 65), that is n = (0.653
-!> E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a small push.
+!> E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a small push. With the
+!> default law the force is E d/(1 + (d/w)^2)^2, and the same restoring moment.
 module b14_stack
    use outlines, only: gravity
    use trial, only: area_law, steps
@@ -34,7 +35,6 @@ contains
       type(table_t), intent(inout) :: table
       !> Whether to run the high stack
       logical, intent(in) :: thorough
-      real(wp) :: leaning
 
       if (thorough) then
          call stand(table, 50, 1000000, 1.0e8_wp, 'cundall_strack')
@@ -45,24 +45,62 @@ contains
       end if
       call table%show('blocks at which a stack buckles, E = 1e7', &
                       (7.837_wp/12.0_wp*1.0e7_wp*width/weight)**(1.0_wp/3.0_wp))
-      call nudge(table, 24_ip, leaning)
-      call table%expect_absolute('24 blocks, E = 1e7, nudged: the top leans after 2 s by [m]', 0.0_wp, leaning, &
-                                 0.1_wp*width)
-      call nudge(table, 36_ip, leaning)
-      call table%expect_true('36 blocks, E = 1e7, nudged: the top leans by a width within 2 s', leaning > width)
+      call buckle(table, 'area law', area_law)
+      call buckle(table, 'default law', '')
+      call sink(table, 10_ip)
    end subroutine run_stack
+
+   !> A stack below the height at which it buckles stands, and one above it falls.
+   subroutine buckle(table, name, law)
+      type(table_t), intent(inout) :: table
+      !> Law in words, and its entries
+      character(len=*), intent(in) :: name, law
+      real(wp) :: leaning
+
+      call nudge(table, 24_ip, law, leaning)
+      call table%expect_absolute('24 blocks, E = 1e7, '//name//', nudged: the top leans after 2 s by [m]', 0.0_wp, &
+                                 leaning, 0.1_wp*width)
+      call nudge(table, 36_ip, law, leaning)
+      call table%expect_true('36 blocks, E = 1e7, '//name//', nudged: the top leans by a width within 2 s', &
+                             leaning > width)
+   end subroutine buckle
+
+   !> A stack with the default law from its static depths
+   subroutine sink(table, n)
+      type(table_t), intent(inout) :: table
+      integer(ip), intent(in) :: n
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp), allocatable :: start(:, :)
+      real(wp) :: depth, expected
+
+      call build(n, 1.0e7_wp, 'cundall_strack', '', simulation, error)
+      if (.not. allocated(error)) start = simulation%bodies%position
+      if (.not. allocated(error)) call steps(simulation, 20000, error)
+      call table%note_error(error)
+      if (allocated(error)) return
+      depth = 0.5_wp*width - simulation%bodies%position(2, 1)
+      expected = real(n, wp)*weight/1.0e7_wp
+      expected = expected*(1.0_wp + (expected/width)**2)**2
+      call table%expect_relative('default law: depth of the lowest interface [m]', expected, depth, 1.0e-6_wp)
+      call table%expect_absolute('default law: greatest speed [m/s]', 0.0_wp, &
+                                 maxval(abs(simulation%bodies%velocity)), 1.0e-10_wp)
+      call table%expect_absolute('default law: greatest move of a block [m]', 0.0_wp, &
+                                 maxval(abs(simulation%bodies%position - start)), 1.0e-12_wp)
+   end subroutine sink
 
    !> Push a stack sideways: its top gets 1 mm/s. Find the distance of the top from the middle after 2 s, or when it
    !> exceeds a width.
-   subroutine nudge(table, n, leaning)
+   subroutine nudge(table, n, law, leaning)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n
+      character(len=*), intent(in) :: law
       real(wp), intent(out) :: leaning
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       integer(ip) :: k
 
-      call build(n, 1.0e7_wp, 'cundall_strack', simulation, error)
+      call build(n, 1.0e7_wp, 'cundall_strack', law, simulation, error)
       leaning = 0.0_wp
       do k = 1_ip, n
          if (.not. allocated(error)) simulation%bodies%velocity(1, k) = 1.0e-3_wp*real(k, wp)/real(n, wp)
@@ -76,10 +114,10 @@ contains
       call table%note_error(error)
    end subroutine nudge
 
-   subroutine build(n, young, friction, simulation, error)
+   subroutine build(n, young, friction, law, simulation, error)
       integer(ip), intent(in) :: n
       real(wp), intent(in) :: young
-      character(len=*), intent(in) :: friction
+      character(len=*), intent(in) :: friction, law
       type(simulation_t), intent(out) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       character(len=1) :: no_overrides(0)
@@ -88,7 +126,7 @@ contains
       call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
                               to_text(n)// &
                               ' / &forces friction = '''//friction//''' damping_coefficient = 1'// &
-                              area_law//' stiffness = '//to_text(young)// &
+                              law//' stiffness = '//to_text(young)// &
                               ' / &integrate duration = 1000 / &output energy_balance = .false. /', &
                               no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
@@ -107,7 +145,7 @@ contains
 
       call table%begin('B14', 'a stack of '//to_text(int(n, ip))//' squares from its static depths, '// &
                        to_text(int(n_steps, ip))//' steps, friction '//friction)
-      call build(int(n, ip), young, friction, simulation, error)
+      call build(int(n, ip), young, friction, area_law, simulation, error)
       if (.not. allocated(error)) start = simulation%bodies%position
       if (.not. allocated(error)) call steps(simulation, n_steps, error)
       call table%note_error(error)

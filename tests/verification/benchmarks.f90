@@ -36,6 +36,7 @@ module benchmarks
    use b31_materials, only: run_materials
    use b32_rolling_resistance, only: run_rolling_resistance
    use b33_yielding_cell, only: run_yielding_cell
+   use b34_arches, only: run_arches
    use s32_flat_impact, only: run_flat_impact
    use s33_corner_impact, only: run_corner_impact
    use s34_oblique_impact, only: run_oblique_impact
@@ -48,7 +49,7 @@ module benchmarks
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
       'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B10', 'B11', 'B12', 'B13', &
       'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24', 'B25', 'B26', 'B27', 'B28', &
-      'B29', 'B30', 'B31', 'B32', 'B33']
+      'B29', 'B30', 'B31', 'B32', 'B33', 'B34']
    !> Benchmarks without a short version
    character(len=8), parameter :: long_names(*) = [character(len=8) :: 'B17', 'B19', 'B20', 'B21']
 
@@ -136,6 +137,8 @@ contains
          call run_rolling_resistance(table)
       case ('B33')
          call run_yielding_cell(table, thorough)
+      case ('B34')
+         call run_arches(table, thorough)
       end select
    end subroutine run_benchmark
 

@@ -47,7 +47,7 @@ contains
       self%stage = stage_elastic
       self%stiffness = pairs%stiffness
       self%undamped_warning = 'the area law is not conservative: without damping it adds kinetic energy at '// &
-         'any time step (a third in 0.2 s in a gas); set law = ''conservative'' in &forces, or use damping'
+         'any time step (a third in 0.2 s in a gas); set law = ''polar'' in &forces, or use damping'
    end subroutine configure
 
    !> Set the characteristic length and add the elastic force. It acts at the centroid of the overlap.

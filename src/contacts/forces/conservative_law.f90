@@ -3,7 +3,7 @@
 !>
 !>     conservative       E G^2/(2 l b)
 !>     own_length         E G^2/(2 l L)
-!>     polar              E A^2/(2 L^2)
+!>     polar              E A^2/(2 L^2)      the default of the namelist
 !>     effective_polar    E G^2/(2 L^2)
 !>
 !> The first one: with N and M of `effective_area`, dG/dt = N . (v1 - v2) + M1 w1 - M2 w2. With W' = dW/dG = E G/(l b),
@@ -52,7 +52,7 @@ module polydem_conservative_law
    private
    public :: conservative_law_t
 
-   !> A law with a potential; default: the conservative law
+   !> A law with a potential: the polar law, the default of the namelist, or another
    type, extends(force_part_t) :: conservative_law_t
       !> Young's modulus in two dimensions E [N/m2]
       type(pair_value_t) :: stiffness
