@@ -373,8 +373,8 @@ contains
       room = size(shares%groups%pair, kind=ip)
       if (allocated(shares%force)) then
          if (size(shares%force) < room) deallocate (shares%force, shares%dashpot, shares%spring, shares%joined, &
-                                                    shares%part, shares%joint, shares%next, shares%leader, shares%mine, &
-                                                    shares%member, shares%pieces)
+                                                    shares%part, shares%joint, shares%next, shares%leader, &
+                                                    shares%mine, shares%member, shares%pieces)
       end if
       if (.not. allocated(shares%force)) then
          allocate (shares%force(room), shares%dashpot(room), shares%spring(room), shares%joined(room), &

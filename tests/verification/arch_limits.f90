@@ -64,7 +64,7 @@ contains
       end do
    end function critical_thickness
 
-   !> Greatest range of M over all H, negative if there is none [N]. It is a concave function of H; golden-section search
+   !> Greatest range of M over all H, negative if there is none [N]. It is concave in H; golden-section search
    pure real(wp) function widest_gap(n, thickness, friction)
       !> Number of wedges
       integer(ip), intent(in) :: n

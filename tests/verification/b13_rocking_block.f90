@@ -46,7 +46,8 @@ contains
       call rock(table, 'on supports, default law, E = 1e7: ', 0.01_wp*width, with_default(1.0e7_wp), .false.)
       call rock(table, 'on supports, default law, E = 1e8: ', 0.01_wp*width, with_default(1.0e8_wp), .true.)
       call rock(table, 'on a plane, default law, E = 1e8: ', 0.5_wp*width, with_default(1.0e8_wp), .false.)
-      if (thorough) call rock(table, 'on a plane, default law, E = 1e9: ', 0.5_wp*width, with_default(1.0e9_wp), .false.)
+      if (thorough) &
+         call rock(table, 'on a plane, default law, E = 1e9: ', 0.5_wp*width, with_default(1.0e9_wp), .false.)
    end subroutine run_rocking_block
 
    !> Compare one fall. `under` is the length of a support under the block [m].

@@ -63,7 +63,7 @@ contains
       call table%expect_true(name//'at 1.02: the top block falls by its height within 2 s', fallen > height)
    end subroutine lean
 
-   !> Share of its overhangs at which a stack falls with the default law, when gravity rises slowly, with two stiffnesses.
+   !> Share of its overhangs at which a stack falls with the default law, gravity rising slowly, with two stiffnesses.
    subroutine lean_slowly(table, n, young, range)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n

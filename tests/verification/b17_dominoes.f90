@@ -13,7 +13,7 @@
 !> slip, as in the theory. In one row feet have the friction of dominoes; Chipmunk, Box2D and Rapier tend to 4.235,
 !> 4.233 and 4.231 m/s at 1 m with plastic impacts (Box2D to 4.322 with restitution 0.1).
 !>
-!> With friction the wave is faster than theory, by 2 % with mu = 0.2 and 5 to 6 % with 0.4 at all gaps; so the tolerance
+!> With friction the wave is faster than theory, by 2 % with mu = 0.2, 5 to 6 % with 0.4 at all gaps; so the tolerance
 !> is 8 % there. Without friction it agrees to 0.9 %. Waves of narrow gaps need 28 dominoes to become steady.
 module b17_dominoes
    use domino_train, only: domino_t, wave_speed

@@ -185,8 +185,8 @@ contains
          if (law == 'conservative') face = (0.5_wp*(head - slot))**2/(thick*head)
          call table%expect_relative('key in a lock, '//law//': depth of its head in the lips [m]', &
                                     weight/(2.0_wp*stiffness*face), sunk, 1.0e-6_wp)
-         call table%expect_absolute('key in a lock, '//law//': speed at rest [m/s]', 0.0_wp, norm2(bodies%velocity(:, 2)), &
-                                    1.0e-9_wp)
+         call table%expect_absolute('key in a lock, '//law//': speed at rest [m/s]', 0.0_wp, &
+                                    norm2(bodies%velocity(:, 2)), 1.0e-9_wp)
       end associate
    end subroutine hang_key
 

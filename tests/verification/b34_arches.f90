@@ -77,7 +77,7 @@ contains
       end do
    end function least_friction
 
-   !> Thickness at which an arch falls, with two stiffnesses. Hinges press corners into joints, as deep as F/E: the error
+   !> Thickness at which an arch falls, with two stiffnesses. Hinges press corners into joints as deep as F/E: the error
    !> is of first order in 1/E.
    subroutine find_thickness(table, n, young)
       type(table_t), intent(inout) :: table

@@ -361,8 +361,8 @@ contains
       end do
    end subroutine direct_from_centres
 
-   !> Find the depths of the overlaps: area over length. With an area that is not the true one, this is how far a body has
-   !> to move until the area is zero if it falls at a constant rate.
+   !> Find the depths of the overlaps: area over length. With an area that is not the true one, this is how far a body
+   !> has to move until the area is zero if it falls at a constant rate.
    pure subroutine find_depths(block)
       type(contact_block_t), intent(inout) :: block
       integer(ip) :: c

@@ -128,7 +128,7 @@ contains
       self%pressure%is_of_bodies = origin == of_bodies
    end subroutine consider
 
-   !> Pressure of a load on the width of its wall, with the weight of the wall if its mass is given; 0 of a torque [N/m2]
+   !> Pressure of a load on its wall, with the weight of the wall if its mass is given; 0 of a torque [N/m2]
    function load_pressure(self, load, number) result(pressure)
       type(simulation_t), intent(in) :: self
       !> The load
