@@ -48,8 +48,9 @@ load.stage cell.damping_ratio cell.stage cell.profile source.count source.interv
 source.stage source.material source.outline_corners sink.interval sink.stage stage.until stage.below stage.above
 stage.check stage.at_limit stage.friction_scale stage.sink sample.area forces.law forces.damping forces.restitution
 forces.damping_coefficient forces.damping_from_touch forces.tilt_damping forces.friction forces.friction_coefficient
-forces.tangential_stiffness forces.stiffness_over_pressure forces.midstep_slip forces.rolling_friction forces.local_damping material.restitution
-material.damping_coefficient material.friction_coefficient material.tangential_stiffness material.rolling_friction
+forces.tangential_stiffness forces.stiffness_over_pressure forces.midstep_slip forces.rolling_friction
+forces.local_damping material.restitution material.damping_coefficient material.friction_coefficient
+material.tangential_stiffness material.rolling_friction
 contact_pair.materials contact_pair.restitution contact_pair.friction_coefficient contact_pair.rolling_friction
 integrate.scheme integrate.accumulation output.contacts output.frames_per_segment checkpoint.wall_interval
 scene.name scene.bodies_file scene.start_from scene.material neighbours.finder guards.overlap guards.tunnelling

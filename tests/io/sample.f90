@@ -66,6 +66,7 @@ contains
          contacts%area(c) = real(step, wp) + real(c, wp)
          contacts%arm_first(:, c) = [0.25_wp, real(c, wp)]
          contacts%normal(:, c) = [0.0_wp, 0.125_wp]
+         contacts%depth(c) = contacts%area(c)/0.125_wp
          contacts%direction(:, c) = [1.0_wp, 0.0_wp]
          contacts%normal_force(c) = real(c, wp)
          contacts%tangential_force(c) = -real(step, wp)

@@ -59,9 +59,10 @@ env >"$NOTES/environment"
 echo "$2 ranks"
 shift 2
 [ -n "$MPIRUN_WAITS" ] || exec "$@"
-# Its only rank ends so, or lives; it does not look after it.
+# Its only rank ends so, or lives; it does not look after it: the rank waits until it has become sleep.
 if [[ $MPIRUN_WAITS = rank:* ]]; then
-  (export OMPI_COMM_WORLD_RANK=0 && exec bash -c "${MPIRUN_WAITS#*:}") &
+  waits='until read -r name <"/proc/$PPID/comm" && [ "$name" = sleep ]; do sleep 0.01; done; '
+  (export OMPI_COMM_WORLD_RANK=0 && exec bash -c "$waits${MPIRUN_WAITS#*:}") &
   exec sleep "$MPIRUN_SECONDS"
 fi
 trap 'echo USR1 >>"$NOTES/heard"; [ "$MPIRUN_WAITS" = long ] || { sleep 0.3; exit 75; }' USR1

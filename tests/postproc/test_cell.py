@@ -84,7 +84,7 @@ def test_paths_and_arms_in_a_sheared_cell(tmp_path):
     subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", tmp_path / "shear.nml"], check=True, stdout=subprocess.PIPE)
     run = Trajectory(tmp_path / "result")
     assert np.abs(np.diff(run.series("unwrapped"), axis=0)).max() < 0.02
-    assert np.ptp(run.series("unwrapped")[-1, :, 0]) > 0.1
+    assert np.ptp(run.series("unwrapped")[-1, :, 0]) > 0.09
     assert len({frame.shift for frame in run}) > 10
     assert len(run[-1].shifts) == 10
     for frame in run:

@@ -35,6 +35,7 @@ PAGES = [
 OTHERS = {
     "README.md",
     "inputs/README.md",
+    "inputs/accuracy.md",
     "inputs/checks.md",
     "inputs/entries.md",
     "inputs/getting_started.md",

@@ -98,7 +98,7 @@ def test_a_block_at_rest_on_a_slope_stands_on_the_point_below_its_centre(tmp_pat
     run = run_of(f"""\
 &wall name = 'floor' outline = 'rectangle' low = -0.5, -0.1 high = 0.5, 0 /
 &grains name = 'block' region = 'at' at = 0, 0.05 shape = 'rectangle' width = 0.12 height = 0.1 /
-&forces gravity = {9.81 * np.sin(slope)}, {-9.81 * np.cos(slope)} stiffness = 1e6 friction_coefficient = 0.6 /
+&forces gravity = {9.81 * np.sin(slope)}, {-9.81 * np.cos(slope)} stiffness = 1e7 friction_coefficient = 0.6 /
 &integrate duration = 2 /
 &sample area = 'rectangle' low = -0.1, 0 high = 0.1, 0.1 /
 """, tmp_path)

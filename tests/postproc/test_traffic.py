@@ -49,7 +49,7 @@ def test_every_frame_has_its_own_bodies(result):
     assert len(trajectory._files.segments) == 4
     last = trajectory[-1]
     assert last.id[2] > 60 and np.all(last.fixed[:2]) and not last.fixed[2:].any()
-    assert len(last.contacts.first) > 0 and last.walls.id.tolist() == [1, 2]
+    assert max(len(frame.contacts.first) for frame in trajectory) > 10 and last.walls.id.tolist() == [1, 2]
     assert np.array_equal(last.driven, np.zeros(len(last), dtype=bool))
     path = {}
     for frame in trajectory:

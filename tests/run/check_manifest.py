@@ -31,7 +31,7 @@ BED = "&scene name = 'bed' bodies = 700 / &integrate duration = 5e-4 /\n"
 #: Options that record boxes and steps
 RECORDED = ("--set", "output.trace_steps=3", "--set", "output.step_profile=.true.")
 #: Options of another run, whose files differ
-OTHER = ("--set", "forces.friction_coefficient=0.5")
+OTHER = ("--set", "forces.gravity=0,-9")
 #: Names that files of a result have
 NAMES = ("trace.h5", "steps.h5", "overlaps.csv", "profile.h5", "trajectory_0001.h5", "trajectory_0007.h5", "log.txt",
          "checkpoint_1.h5", "checkpoint_2.h5", "manifest.txt")
