@@ -2,9 +2,10 @@
 
 usage: accuracy_study.py PROGRAM FOLDER [SEED]       (default: 1000)
 
-For each law it writes accuracy_LAW_SEED.csv to FOLDER: requested, estimated and achieved error of one quantity per scene.
-Errors are shares of the scale of the quantity. The achieved one is the difference of a run with the recommended entries
-from a run at 100 times the stiffness and a quarter of the step of the scene there. It takes about 15 minutes.
+For each law it writes accuracy_LAW_SEED.csv to FOLDER: requested, estimated and achieved error of one quantity of each
+scene. Errors are shares of the scale of the quantity. The achieved one is the difference of a run with the recommended
+entries from a run at 100 times the stiffness and a quarter of the step of the scene there. It takes six minutes of one
+core.
 """
 
 import csv
