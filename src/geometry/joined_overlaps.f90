@@ -7,7 +7,7 @@
 !>
 !>     p(x) = 3/2 - A |x - c|^2/(2 J),
 !>
-!> under the integrals over the outline of the body inside each piece. Common edges are no outline. What a cut does not
+!> under the integrals over the outlines of both bodies inside each piece. Common edges are no outline. What a cut does not
 !> make convex stays apart: the faces of a notch, two feet, a joint that is not flush.
 !>
 !> So cuts change no force, and a piece that begins to overlap begins with the area 0: the force is continuous as long
@@ -25,8 +25,9 @@ module polydem_joined_overlaps
       integer(ip) :: n = 0_ip
       !> Vertices, anticlockwise, relative to the centre of the body, (corner, x or y) [m]
       real(wp) :: vertex(usual_corners, 2) = 0.0_wp
-      !> Whether the edge from a vertex to the next one is on the outline of the body
-      logical :: on_outline(usual_corners) = .false.
+      !> Whether the edge from a vertex to the next one is on the outline of the body, not of the other one; and whether
+      !> it is an edge in common with another overlap
+      logical :: on_outline(usual_corners) = .false., is_common(usual_corners) = .false.
       !> Number of the first overlap among those that it is joined with; its own number if it is the first
       integer(ip) :: part_of = 0_ip
       !> Area [m2], centroid relative to the centre of the body [m], and polar moment about the centroid [m4]
@@ -38,7 +39,7 @@ module polydem_joined_overlaps
 
 contains
 
-   !> Find which overlaps are joined, and measure them. Edges that two have in common are taken off the outline.
+   !> Find which overlaps are joined, and measure them.
    pure subroutine join_loops(tolerance, loops)
       !> Distance of points that count as one [m]
       real(wp), intent(in) :: tolerance
@@ -48,14 +49,15 @@ contains
 
       do k = 1_ip, size(loops, kind=ip)
          loops(k)%part_of = k
+         loops(k)%is_common = .false.
          call measure(loops(k))
       end do
       do l = 2_ip, size(loops, kind=ip)
          do k = 1_ip, l - 1_ip
             call find_common_edge(loops(k), loops(l), tolerance, i, j)
             if (i == 0_ip) cycle
-            loops(k)%on_outline(i) = .false.
-            loops(l)%on_outline(j) = .false.
+            loops(k)%is_common(i) = .true.
+            loops(l)%is_common(j) = .true.
             from = max(loops(k)%part_of, loops(l)%part_of)
             to = min(loops(k)%part_of, loops(l)%part_of)
             do m = 1_ip, size(loops, kind=ip)
@@ -139,18 +141,20 @@ contains
       before = merge(loop%n, i - 1_ip, i == 1_ip)
    end function before
 
-   !> Gradient of the measure of joined overlaps, the part of one of them.
+   !> Gradient of the measure of joined overlaps, the part of one of them. It is half the integral over the outline of the
+   !> body and half the opposite one over that of the other body: the sums over all parts are equal, and a part does not
+   !> depend on which of both is called the body.
    pure subroutine integrate_joined(loops, k, normal, moment, square)
       !> Overlaps of one body after `join_loops`
       type(overlap_loop_t), intent(in) :: loops(:)
       !> Number of the overlap
       integer(ip), intent(in) :: k
-      !> Integral of p n over the outline of the body inside this piece [m], and its moment about the centre [m2]
+      !> Integral of p n [m], and its moment about the centre [m2]
       real(wp), intent(out) :: normal(2), moment
       !> Square of the length L of all, times the share of this overlap in their area: so the forces and the energies
       !> E/2 area^2/square of the parts add up [m2]
       real(wp), intent(out) :: square
-      real(wp) :: area, centre(2), polar, c(2), r(2), s(2), step(2), weight(3), along(2)
+      real(wp) :: area, centre(2), polar, c(2), r(2), s(2), step(2), weight(3), along(2), half
       integer(ip) :: i, l
 
       area = 0.0_wp
@@ -171,12 +175,13 @@ contains
       normal = 0.0_wp
       moment = 0.0_wp
       do i = 1_ip, loops(k)%n
-         if (.not. loops(k)%on_outline(i)) cycle
+         if (loops(k)%is_common(i)) cycle
+         half = merge(0.5_wp, -0.5_wp, loops(k)%on_outline(i))
          r = loops(k)%vertex(i, :)
          s = loops(k)%vertex(after(loops(k), i), :)
          step = s - r
          ! Terms of Simpson's rule at both ends and in the middle, the latter four times as large
-         weight = [p(r), p(s), 4.0_wp*p(0.5_wp*(r + s))]/6.0_wp
+         weight = half*([p(r), p(s), 4.0_wp*p(0.5_wp*(r + s))]/6.0_wp)
          normal = normal + sum(weight)*[step(2), -step(1)]
          along = [dot_product(step, r), dot_product(step, s)]
          moment = moment - (weight(1)*along(1) + weight(2)*along(2) + weight(3)*0.5_wp*(along(1) + along(2)))
