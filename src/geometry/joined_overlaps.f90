@@ -7,8 +7,8 @@
 !>
 !>     p(x) = 3/2 - A |x - c|^2/(2 J),
 !>
-!> under the integrals over the outlines of both bodies inside each piece. Common edges are no outline. What a cut does not
-!> make convex stays apart: the faces of a notch, two feet, a joint that is not flush.
+!> under the integrals over the outlines of both bodies inside each piece. Common edges are no outline. What a cut does
+!> not make convex stays apart: the faces of a notch, two feet, a joint that is not flush.
 !>
 !> So cuts change no force, and a piece that begins to overlap begins with the area 0: the force is continuous as long
 !> as the parts of a cut end flush, or in a convex corner, where another body reaches.
@@ -141,9 +141,9 @@ contains
       before = merge(loop%n, i - 1_ip, i == 1_ip)
    end function before
 
-   !> Gradient of the measure of joined overlaps, the part of one of them. It is half the integral over the outline of the
-   !> body and half the opposite one over that of the other body: the sums over all parts are equal, and a part does not
-   !> depend on which of both is called the body.
+   !> Gradient of the measure of joined overlaps, the part of one of them. It is half the integral over the outline of
+   !> the body and half the opposite one over that of the other body: the sums over all parts are equal, and a part does
+   !> not depend on which of both is called the body.
    pure subroutine integrate_joined(loops, k, normal, moment, square)
       !> Overlaps of one body after `join_loops`
       type(overlap_loop_t), intent(in) :: loops(:)
