@@ -71,6 +71,16 @@ class Build(Toy):
             self.assertEqual((code, output), (1, ""))
             self.assertIn("Error: Symbol", messages)
 
+    def test_ninja_is_called_until_it_compiles_nothing(self):
+        """Within one call it may leave objects that were compiled with a former module file."""
+        real = shutil.which("ninja")
+        self.write("calls/ninja", f'#!/bin/sh\necho "$*" >>"$NOTES/ninja"\nexec {real} "$@"\n')
+        os.chmod(os.path.join(self.folder, "calls", "ninja"), 0o755)
+        path = f"{os.path.join(self.folder, 'calls')}:{self.environment['PATH']}"
+        for calls in (2, 3):
+            self.assertEqual(self.call("--version", PATH=path)[0], 0)
+            self.assertEqual(sum(line.endswith(" src/app/polydem") for line in self.read("ninja")), calls)
+
     def test_ninja_knows_every_source(self):
         self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90 ../../elsewhere/idle.f90)\n")
         self.write("elsewhere/idle.f90", "subroutine idle()\nend subroutine idle\n")

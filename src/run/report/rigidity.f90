@@ -64,12 +64,10 @@ contains
       character(len=*), intent(in) :: parts
       !> Static pressure over stiffness
       real(wp), intent(in) :: softness
-      integer :: k
+      type(fit_t) :: fit
 
-      tipping_error = 0.0_wp
-      do k = 1, size(fits)
-         if (index(parts, trim(fits(k)%name)) == 1) tipping_error = fitted(fits(k)%tipping, softness)
-      end do
+      fit = fit_of(parts)
+      tipping_error = fitted(fit%tipping, softness)
    end function tipping_error
 
    !> Error of the velocity after an impact on a corner, over the speed of the impact
@@ -78,13 +76,22 @@ contains
       character(len=*), intent(in) :: parts
       !> Pressure of the impact over stiffness
       real(wp), intent(in) :: softness
+      type(fit_t) :: fit
+
+      fit = fit_of(parts)
+      impact_error = fitted(fit%impact, softness)
+   end function impact_error
+
+   !> Fits of the law with which a description of the parts begins
+   pure type(fit_t) function fit_of(parts)
+      character(len=*), intent(in) :: parts
       integer :: k
 
-      impact_error = 0.0_wp
+      fit_of = fit_t('', 0.0_wp, 0.0_wp)
       do k = 1, size(fits)
-         if (index(parts, trim(fits(k)%name)) == 1) impact_error = fitted(fits(k)%impact, softness)
+         if (index(parts, trim(fits(k)%name)) == 1) fit_of = fits(k)
       end do
-   end function impact_error
+   end function fit_of
 
    !> A coefficient times a power with a real exponent
    pure real(wp) function fitted(fit, softness)
