@@ -1,7 +1,7 @@
 !> Depth of contacts relative to the size of their bodies.
 !>
-!> The share of a contact is its depth, the mean depth of the overlap, over the thickness of the thinner of the two
-!> pieces that touch; a convex body is one piece. A share of about 0.5 means that one body is passing through the other.
+!> The share of a contact is its depth over the thickness of the thinner of the two pieces that touch; a convex body is
+!> one piece. A share of about 0.5 means that one body is passing through the other.
 module polydem_contact_depth
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t

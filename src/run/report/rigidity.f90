@@ -82,7 +82,7 @@ contains
       impact_error = fitted(fit%impact, softness)
    end function impact_error
 
-   !> Fits of the law with which a description of the parts begins
+   !> Fits of the law with which a description of the parts begins; 0 of another law
    pure type(fit_t) function fit_of(parts)
       character(len=*), intent(in) :: parts
       integer :: k
@@ -102,13 +102,15 @@ contains
       fitted = fit(1)*exponential(fit(2)*logarithm(softness))
    end function fitted
 
-   !> An error as text: in per cent with one digit
+   !> An error as text: in per cent with one digit; 0: it is not known
    pure function share_text(error) result(text)
       !> Error as a share
       real(wp), intent(in) :: error
       character(len=:), allocatable :: text
 
-      if (error > 1.0_wp) then
+      if (.not. error > 0.0_wp) then
+         text = 'not known'
+      else if (error > 1.0_wp) then
          text = 'above 100 %, far from rigid'
       else if (error >= 0.1_wp) then
          text = 'about '//to_text(10_ip*nint(10.0_wp*error, ip))//' %'
