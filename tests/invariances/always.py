@@ -29,8 +29,6 @@ def faults(scene, answer):
 
 
 def energies(scene, answer):
-    if answer.degenerate:
-        return ""  # where a contact has no direction, its force separates the bodies and has no potential
     balance = answer.balance
     scale = max(balance["kinetic"].max(), *(abs(balance[key]).max() for key in (
         "elastic_work", "damping_work", "friction_work", "wall_work")))

@@ -24,7 +24,7 @@ def border(scene, dice):
     rate = scene.get("cell", "shear_rate", 0.0)
     drift = np.array([-rate*by[1], 0.0])
     profile = scene.get("cell", "profile", False)
-    if rate and RECTANGLES & scene.tags and (scene.start or RECTANGLES & scene.tags != {"source"}):
+    if rate and RECTANGLES & scene.tags and not enters_at_once(scene):
         # Rectangles would move relative to the bodies; a body that enters at once does not see it.
         by[1], drift, low[1] = 0.0, np.zeros(2), scene.get("cell", "low")[1]
         other.put("cell", low=list(low))
@@ -45,6 +45,12 @@ def border(scene, dice):
         other.put(f"source.{name}", low=list(ends[0]), high=list(ends[1]))
     return Case([Play(other)], drift=drift, relative=is_relative(scene),
                 energies="sheared" not in scene.tags)
+
+
+def enters_at_once(scene):
+    """Whether the only rectangle is that of a source, whose body enters before the first step."""
+    late = scene.start or any("stage" in scene.groups[f"source.{name}"] for name in scene.named("source"))
+    return not late and RECTANGLES & scene.tags == {"source"}
 
 
 def is_relative(scene):

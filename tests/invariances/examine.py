@@ -160,6 +160,9 @@ def look(scene, report, choice, home):
         report.fate = "no contact"
         return
     report.pairs = touching_pairs(scene, answer)
+    if answer.degenerate:
+        # Not drawn, but a word of the table of exceptions
+        scene.tags.add("no_direction")
     for name, text in faults(scene, answer):
         report.find(name, text)
     Beside(scene, answer, report, choice, home).try_all()
