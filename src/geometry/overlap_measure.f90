@@ -1,8 +1,8 @@
 !> How the size of an overlap is measured: by its area, its effective area, or its area over its length.
 !>
 !> With the area A, the centroid c, the second moments S about c, their sum J = tr S, the effective area G
-!> (`polydem_effective_area`) and the length L of the overlap, L^2 = 12 J/A, a law of force has an energy in proportion
-!> to the square of X, which is A, G or A/L. A strip of the length w and the depth d has A = G = w d and L = w up to
+!> (`polydem_effective_area`) and the length L of the overlap, L^2 = 12 J/A, a law with a potential has an energy in
+!> proportion to X^2, where X is G or A/L. A strip of the length w and the depth d has A = G = w d and L = w up to
 !> (d/w)^2. So A/L is a depth, whatever the length of the contact. At a corner it is in proportion to the depth.
 !>
 !> If the outline moves outwards with speed u, A changes at the rate integral of u ds, and J at the rate integral of
