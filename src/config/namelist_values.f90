@@ -133,6 +133,7 @@ contains
 
    !> Whether a text in lower case is a number whose reading neither overflows nor underflows
    pure logical function is_readable(text)
+      !> Text in lower case
       character(len=*), intent(in) :: text
 
       is_readable = is_number(text)
