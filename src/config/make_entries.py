@@ -1,7 +1,8 @@
 """Make what follows from the table of namelist entries.
 
 make_entries.py ENTRIES.txt FOLDER: the Fortran sources entry_table.f90 (the table as constants), settings.f90 (one type
-per group) and fill_groups.f90 (fills these types).
+per group), fill_groups.f90 (fills these types) and pair_entries.f90 (numbers that pairs of materials may have).
+make_entries.py ENTRIES.txt FOLDER --pairs: pair_values.f90, the type of these numbers in a force law.
 make_entries.py ENTRIES.txt PAGE.md [--check]: the table of the manual, between the lines <!-- entries --> and
 <!-- /entries -->; with --check it must be there already.
 """
@@ -12,7 +13,9 @@ import textwrap
 from collections import namedtuple
 from pathlib import Path
 
-Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual")
+Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual mixed")
+#: Fields that may be left out at the end of a row
+LATE = 2
 Group = namedtuple("Group", "meaning is_repeatable")
 #: Components: the Fortran type of one value and its value before it is filled
 TYPES = {"real": ("real(wp)", "0.0_wp"), "integer": ("integer(ip)", "0_ip"), "logical": ("logical", ".false.")}
@@ -26,6 +29,11 @@ USUAL = re.compile(rf"{BOUND}(?:(?:, | or | / ){BOUND})*: .+")
 BENCH = "bench"
 #: Groups that a recipe makes, which --expand prints
 PARTS = ("grains", "wall")
+#: Groups that have the numbers of &forces that are mixed, and how they say it
+PAIRS = {"material": "; of two materials: {}", "contact_pair": ""}
+#: How numbers a and b of two materials are mixed
+MIXED = {"smaller one": "min({a}, {b})", "mean": "0.5_wp*({a} + {b})", "geometric mean": "sqrt({a})*sqrt({b})",
+         "harmonic mean": "2.0_wp*min({a}, {b})*(max({a}, {b})/({a} + {b}))"}
 #: Longest piece of a text on a line
 WIDTH = 90
 
@@ -50,8 +58,8 @@ def read_table(text):
             lists[name] = with_lists(words.strip(), lists, number)
         else:
             fields = ["" if field.strip() == "-" else field.strip() for field in line.split(" | ")]
-            if len(fields) not in (len(Row._fields) - 1, len(Row._fields)):
-                raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - 1}")
+            if not len(Row._fields) - LATE <= len(fields) <= len(Row._fields):
+                raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - LATE}")
             fields += [""] * (len(Row._fields) - len(fields))
             if not fields[3].isdigit():
                 raise TableError(f"line {number}: {fields[3]} is not a number of values")
@@ -60,10 +68,22 @@ def read_table(text):
             if problem:
                 raise TableError(f"line {number}: {problem}")
             rows.append(row)
+    rows = with_pairs(groups, rows)
     for row in rows:
         if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
             raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def with_pairs(groups, rows):
+    """The rows, and those of the numbers of pairs behind the other ones of their groups."""
+    for group, ending in PAIRS.items():
+        if group in groups:
+            place = max(k for k, row in enumerate(rows) if row.group == group) + 1
+            rows[place:place] = [row._replace(group=group, default="", needs="", mixed="",
+                                              meaning=row.meaning.partition("; ")[0] + ending.format(row.mixed))
+                                 for row in rows if row.mixed]
+    return rows
 
 
 def problem_of(row, groups, earlier):
@@ -74,6 +94,8 @@ def problem_of(row, groups, earlier):
         return f"there is no entry of type {row.type} with {row.count} values"
     if row.usual and (row.type != "real" or not USUAL.fullmatch(row.usual)):
         return f"{row.usual} is no usual range of {row.key}"
+    if row.mixed and (row.mixed not in MIXED or (row.group, row.type, row.count) != ("forces", "real", 1)):
+        return f"{row.key} is not mixed: {row.mixed}"
     same = [other for other in earlier if (other.group, other.key) == (row.group, row.key)]
     if any((other.type, other.count) != (row.type, row.count) for other in same):
         return f"{row.key} has another type in an earlier row"
@@ -236,6 +258,73 @@ def fill_module(groups, rows):
                   "\n".join(parts))
 
 
+def pair_module(rows):
+    """Numbers of &forces that pairs of materials may have: their names, where they stand, and how they are mixed."""
+    keys = [row.key for row in rows if row.mixed]
+    names = ", &\n".join(f"      '{key}'" for key in keys)
+    body = (f"   !> How many there are\n   integer, parameter :: n_pair_entries = {len(keys)}\n"
+            "   !> Their keys\n   character(len=*), parameter :: pair_entries(n_pair_entries) = &\n"
+            f"      [character(len={max(map(len, keys))}) :: &\n{names}]\n")
+    for k, key in enumerate(keys, 1):
+        body += f"   !> Place of {key}\n   integer, parameter :: at_{key} = {k}\n"
+    common = ", &\n".join(f"         forces%{key}" for key in keys)
+    parts = ["   !> Numbers that are those of all pairs if no group gives others\n"
+             "   pure function common_values(forces) result(values)\n      !> Group &forces\n"
+             "      type(forces_settings_t), intent(in) :: forces\n      real(wp) :: values(n_pair_entries)\n\n"
+             f"      values = [ &\n{common}]\n   end function common_values\n"]
+    for group in PAIRS:
+        takes = "".join(f"      if (allocated(group%{key})) values({k}) = group%{key}\n"
+                        for k, key in enumerate(keys, 1))
+        parts.append(f"   !> Take what a group &{group} gives.\n"
+                     f"   pure subroutine take_{group}(group, values)\n      !> The group\n"
+                     f"      type({group}_settings_t), intent(in) :: group\n"
+                     "      !> The numbers\n      real(wp), intent(inout) :: values(n_pair_entries)\n\n"
+                     f"{takes}   end subroutine take_{group}\n")
+    mixes = "".join(f"      mixed({k}) = {MIXED[row.mixed].format(a=f'a({k})', b=f'b({k})')}\n"
+                    for k, row in enumerate((row for row in rows if row.mixed), 1))
+    parts.append("   !> Numbers of the contacts of two materials. Equal ones are not changed, not even by rounding, and both\n"
+                 "   !> orders give the same bits.\n   pure function mixed_values(a, b) result(mixed)\n"
+                 "      !> Numbers of both materials\n"
+                 "      real(wp), intent(in) :: a(n_pair_entries), b(n_pair_entries)\n"
+                 "      real(wp) :: mixed(n_pair_entries)\n\n"
+                 f"{mixes}      where (abs(a - b) <= 0.0_wp) mixed = a\n   end function mixed_values\n")
+    groups = ["forces", *PAIRS]
+    return module("pair_entries", "Numbers of &forces that pairs of materials may have.",
+                  ["kinds, only: wp", *(f"settings, only: {group}_settings_t" for group in groups)],
+                  ["n_pair_entries", "pair_entries", *(f"at_{key}" for key in keys), "common_values", "mixed_values",
+                   *(f"take_{group}" for group in PAIRS)], body, "\n".join(parts))
+
+
+def value_module(rows):
+    """The type of these numbers in a force law, and what fills it from their table."""
+    pairs = [row for row in rows if row.mixed]
+    components = "".join(f"{component(row._replace(meaning=row.meaning.partition('; ')[0], default='0'))}\n"
+                         .replace(f"real(wp) :: {row.key} = 0.0_wp", f"type(pair_value_t) :: {row.key}")
+                         for row in pairs)
+    body = ("   !> Parameters of contacts, as in the namelist, but for the tangential stiffness: it is in N/m2\n"
+            "   type :: pair_parameters_t\n"
+            "      !> Number of materials besides number 0\n      integer(ip) :: n_materials = 0_ip\n"
+            f"{components}   end type pair_parameters_t\n")
+    sets = "".join(f"      pairs%{row.key} = new_pair_value(table(:, :, {k}), one({k}))\n"
+                   for k, row in enumerate(pairs, 1))
+    cases = "".join(f"      case ({k})\n         value = pairs%{row.key}\n" for k, row in enumerate(pairs, 1))
+    contains = ("   !> Set all parameters.\n   pure subroutine set_parameters(pairs, table, one)\n"
+                "      !> The parameters\n      type(pair_parameters_t), intent(inout) :: pairs\n"
+                "      !> Values of each pair of materials, (0:n, 0:n, parameter)\n"
+                "      real(wp), intent(in) :: table(0:, 0:, :)\n"
+                "      !> Common factor of each parameter if its values differ, positive\n"
+                "      real(wp), intent(in) :: one(:)\n\n"
+                f"      pairs%n_materials = ubound(table, 1, kind=ip)\n{sets}   end subroutine set_parameters\n\n"
+                "   !> A parameter by its place in `pair_entries`\n"
+                "   pure type(pair_value_t) function parameter_at(pairs, place) result(value)\n"
+                "      type(pair_parameters_t), intent(in) :: pairs\n      !> Its place\n"
+                "      integer, intent(in) :: place\n\n"
+                f"      select case (place)\n{cases}      end select\n   end function parameter_at\n")
+    return module("pair_values", "Parameters of contacts that may differ between pairs of materials.",
+                  ["kinds, only: ip, wp", "pair_value, only: new_pair_value, pair_value_t"],
+                  ["pair_parameters_t", "set_parameters", "parameter_at"], body, contains)
+
+
 def manual(rows):
     """The table of entries in Markdown."""
     text = ("| group | key | type | unit | default | range | used with | meaning |\n"
@@ -283,9 +372,14 @@ def main(table, target, *options):
     if target.endswith(".md"):
         update_manual(target, rows, "--check" in options)
         return
+    if "--pairs" in options:
+        made = {"pair_values": value_module(rows)}
+    else:
+        made = {"entry_table": table_module(groups, rows), "settings": settings_module(groups, rows),
+                "fill_groups": fill_module(groups, rows), "pair_entries": pair_module(rows)}
     Path(target).mkdir(parents=True, exist_ok=True)
-    for name, make in (("entry_table", table_module), ("settings", settings_module), ("fill_groups", fill_module)):
-        (Path(target) / f"{name}.f90").write_text(make(groups, rows), encoding="utf-8")
+    for name, text in made.items():
+        (Path(target) / f"{name}.f90").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

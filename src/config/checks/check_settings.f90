@@ -29,9 +29,6 @@ module polydem_check_settings
       'turn with it; use translation or oscillation'
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
-   !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
-   !> restitution, and so is a time step that resolves the impact
-   real(wp), parameter :: least_restitution = 0.01_wp
 
    !> Scenes in which `width` is the width of the container; in other scenes it is the width of a block
    character(len=*), parameter :: grain_scenes(4) = [character(len=6) :: 'hopper', 'gas', 'bed', 'heap']
@@ -53,12 +50,6 @@ contains
       call check_motions(settings, instances, error)
       call check_cell(settings, instances, error)
       associate (group => instances(index_of_instance(instances, 'forces')))
-         associate (given => group%values(row_of(group, 'restitution')))
-            if (given%is_active .and. settings%forces%restitution < least_restitution) then
-               call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
-                  'because a smaller value needs a very small time step; give ''damping_coefficient'' instead')
-            end if
-         end associate
          call check_gravity(settings, group, error)
          call check_pressure(settings, group, error)
       end associate

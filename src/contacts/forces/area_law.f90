@@ -12,6 +12,7 @@ module polydem_area_law
    use polydem_elementary, only: hypotenuse
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
+   use polydem_pair_entries, only: at_stiffness
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -45,6 +46,7 @@ contains
       associate (unused => settings)
       end associate
       self%stage = stage_elastic
+      self%logged = [at_stiffness]
       self%stiffness = pairs%stiffness
       self%undamped_warning = 'the area law is not conservative: without damping it adds kinetic energy at '// &
          'any time step (a third in 0.2 s in a gas); set law = ''polar'' in &forces, or use damping'

@@ -45,6 +45,7 @@ module polydem_conservative_law
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_overlap_measure, only: effective_area, overlap_measure_t
+   use polydem_pair_entries, only: at_stiffness
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -95,6 +96,7 @@ contains
          self%overlap_measure = effective_area
       end select
       self%energy_is_known = .true.
+      self%logged = [at_stiffness]
       self%stiffness = pairs%stiffness
    end subroutine configure
 

@@ -11,6 +11,7 @@ module polydem_force_law
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic, stage_on_damping
    use polydem_kinds, only: ip, wp
    use polydem_overlap_measure, only: overlap_measure_t
+   use polydem_pair_entries, only: n_pair_entries
    use polydem_pair_parameters, only: pair_parameters_t, uniform_parameters
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_velocity_constraint, only: velocity_constraint_t
@@ -47,6 +48,8 @@ module polydem_force_law
       logical :: energy_is_known = .false.
       !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
+      !> Parameters that the log has for each pair of materials, by their places in `pair_entries`
+      logical :: logged(n_pair_entries) = .false.
    contains
       procedure, private :: add_part
       procedure, private :: add_constraint
@@ -128,6 +131,7 @@ contains
             law%energy_is_known = law%energy_is_known .or. part%energy_is_known
             part%first_column = size(law%history_kinds) + 1
             if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
+            if (allocated(part%logged)) law%logged(part%logged) = .true.
             if (k > 1 .and. part%stage /= stage_on_damping) law%description = law%description//','
             law%description = law%description//' '//trim(part%name)
          end associate
@@ -136,6 +140,7 @@ contains
          associate (part => law%constraint)
             part%first_column = size(law%history_kinds) + 1
             if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
+            if (allocated(part%logged)) law%logged(part%logged) = .true.
             law%description = law%description//', '//trim(part%name)
          end associate
       end if

@@ -205,8 +205,7 @@ contains
             call weigh('load.'//s%load(k)%name, key, '&load '//s%load(k)%name, load_pressure(simulation, s%load(k), k))
          end do
          if (s%cell%obeys /= 'none') call weigh('cell', 'stress', '&cell', maxval(abs(s%cell%stress)))
-         if (index(law%description, 'cohesion') > 0) call weigh('forces', 'cohesion', '&forces or &material', &
-                                                                  law%pairs%cohesion%greatest())
+         call weigh('forces', 'cohesion', '&forces or &material', law%pairs%cohesion%greatest())
       end associate
 
    contains
