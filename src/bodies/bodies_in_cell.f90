@@ -83,6 +83,7 @@ contains
 
       place = bodies%position(:, s)
       if (allocated(bodies%image)) place = place + real(bodies%image(s, :), wp)*bodies%cell%size
+      if (allocated(bodies%slid)) place(1) = place(1) + bodies%slid(s)
    end function path_of
 
    !> Stretch the places of some free bodies as the cell grows in this step. Several threads may call it for different

@@ -120,16 +120,15 @@ contains
 
       root = sqrt(12.0_wp*sqrt(determinant))
       unit = root/(24.0_wp*determinant)
-      form = by%share_effective*moments
+      form = moments
       even = 0.0_wp
-      if (by%power > 0.0_wp) then
+      if (by%per_length) then
          polar = square*moments(1) + unit_area*(unit_area/square)*moments(3)
          overlap%length_square = 12.0_wp*(unit_area*polar/overlap%area)
-         if (.not. by%share_effective > 0.0_wp) root = overlap%area/unit_area
-         even = ((1.0_wp - by%share_effective) + 0.5_wp*by%power)/6.0_wp*(unit_area*root/overlap%area)
-         polar = by%power/12.0_wp*(root/(unit*polar))
-         form(3) = form(3) - polar*square
-         form(1) = form(1) - polar*(unit_area*(unit_area/square))
+         root = overlap%area/unit_area
+         even = 0.25_wp*(unit_area*root/overlap%area)
+         polar = 1.0_wp/12.0_wp*(root/(unit*polar))
+         form = -polar*[unit_area*(unit_area/square), 0.0_wp, square]
       end if
       overlap%area = unit_area*root
    end subroutine find_weight

@@ -13,9 +13,9 @@
 !> linear in F and D. The moments of Q's part are opposite, since those about c vanish for the whole. So half the
 !> difference of both parts serves as F and D, and an exchange of P and Q changes no bit but signs.
 !>
-!> A measure that is divided by a power of L adds a constant to the weight, of which only the integral over the chord is
-!> left, and a multiple of |x - c|^2, which is added to the coefficients of L(x, y). The moment of its gradient about c
-!> vanishes everywhere.
+!> The weight of the area over the length is a constant, of which only the integral over the chord is left, and a
+!> multiple of |x - c|^2, whose coefficients replace those of L(x, y). The moment of its gradient about c vanishes
+!> everywhere.
 module polydem_lens_effective_area
    use polydem_kinds, only: ip, wp
    use polydem_lens_work, only: lens_work_t
@@ -51,7 +51,8 @@ module polydem_lens_effective_area
       real(wp) :: centroid(column_length, 2)
       !> Integrals over each arc for the second moments xx, xy, yy about the centroid
       real(wp) :: second(column_length, 3, 2)
-      !> Constant part of the weight, its part in proportion to |x - c|^2 in the unit of the form L(x, y)
+      !> Constant part of the weight, and its part in proportion to |x - c|^2, in the unit of the form L(x, y); both are
+      !> 0 for the effective area
       real(wp) :: even(column_length), polar(column_length)
    end type work_t
 
@@ -75,8 +76,14 @@ contains
       call find_centroid(n, work%fan(:, :, 1), work%fan(:, :, 2), work%centroid)
       call find_second_moments(n, work%place(:, :, :, 1), work%centroid, -0.5_wp, work%second(:, :, 1))
       call find_second_moments(n, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
-      call find_parts_of_weight(n, measure, work, columns)
-      call weigh(n, measure%share_effective, work, lens, columns)
+      if (measure%per_length) then
+         call find_parts_of_weight(n, work, columns)
+      else
+         work%even(:n) = 0.0_wp
+         work%polar(:n) = 0.0_wp
+         columns%length_square(:n) = 0.0_wp
+      end if
+      call weigh(n, merge(0.0_wp, 1.0_wp, measure%per_length), work, lens, columns)
       if (measure%with_area) call keep_area(n, work, columns)
    end subroutine integrate_effective_area
 
@@ -196,21 +203,14 @@ contains
       end do
    end subroutine find_second_moments
 
-   !> Find the parts of the weight that the division by a power of L adds.
-   pure subroutine find_parts_of_weight(n, measure, work, columns)
+   !> Find length and parts of the weight of the area over the length.
+   pure subroutine find_parts_of_weight(n, work, columns)
       integer(ip), intent(in) :: n
-      type(overlap_measure_t), intent(in) :: measure
       type(work_t), intent(inout) :: work
       type(overlap_columns_t), intent(inout) :: columns
-      real(wp) :: mxx, mxy, myy, safe, root, area, size, polar, hz
+      real(wp) :: mxx, mxy, myy, safe, root, area, polar, hz
       integer(ip) :: i
 
-      if (.not. measure%power > 0.0_wp) then
-         work%even(:n) = 0.0_wp
-         work%polar(:n) = 0.0_wp
-         columns%length_square(:n) = 0.0_wp
-         return
-      end if
       do i = 1_ip, n
          mxx = work%second(i, 1, 1) + work%second(i, 1, 2)
          mxy = work%second(i, 2, 1) + work%second(i, 2, 2)
@@ -220,10 +220,9 @@ contains
          area = max(0.5_wp*(work%fan(i, 1, 1) + work%fan(i, 1, 2)), 0.25_wp)
          hz = work%unit_area(i)*(work%unit_area(i)/work%square(i))
          polar = max(work%square(i)*mxx + hz*myy, least_polar*work%square(i))
-         size = measure%share_effective*root + (1.0_wp - measure%share_effective)*area
-         work%even(i) = ((1.0_wp - measure%share_effective) + 0.5_wp*measure%power)*(size/area)
+         work%even(i) = 1.5_wp
          ! The form has the unit root/(4 determinant).
-         work%polar(i) = (2.0_wp*measure%power)*(size*safe)/(root*polar)
+         work%polar(i) = 2.0_wp*(area*safe)/(root*polar)
          columns%length_square(i) = 12.0_wp*(polar/area)
       end do
    end subroutine find_parts_of_weight
@@ -231,7 +230,7 @@ contains
    !> Compute the results from the moments.
    pure subroutine weigh(n, share, work, lens, columns)
       integer(ip), intent(in) :: n
-      !> Share of the effective area in the measure, 1 or 0
+      !> 1 if the measure is the effective area, 0 if it is the area over the length
       real(wp), intent(in) :: share
       type(work_t), intent(in) :: work
       type(lens_work_t), intent(inout) :: lens

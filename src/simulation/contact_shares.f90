@@ -72,7 +72,7 @@ contains
       shares%joined(:shares%groups%n)%is_joined = .false.
       shares%joins = .false.
       call find_all_springs(law, bodies, pairs, history, shares)
-      if (law%overlap_measure%joins()) call join_groups(bodies, pairs, shares)
+      if (law%overlap_measure%per_length) call join_groups(bodies, pairs, shares)
       if (shares%joins) call find_all_springs(law, bodies, pairs, history, shares)
       call divide(shares)
    end subroutine find_shares

@@ -6,7 +6,7 @@ module remembered_overlap
    use polydem_kinds, only: ip, lp, wp
    use polydem_lens_kernel_base, only: evaluate_batch
    use polydem_overlap_batch, only: add_lane, lanes, overlap_batch_t, overlap_columns_t
-   use polydem_overlap_measure, only: effective_area, overlap_measure_t, true_area
+   use polydem_overlap_measure, only: area_per_length, effective_area, overlap_measure_t, true_area
    use polydem_random, only: random_t
    use polydem_separation, only: test_edges
    implicit none
@@ -30,10 +30,7 @@ contains
    !> Every measure of overlaps in turn, with the gradient of the true area
    pure type(overlap_measure_t) function measure_of(k)
       integer, intent(in) :: k
-      type(overlap_measure_t), parameter :: all_measures(0:4) = [ &
-         true_area, effective_area, overlap_measure_t(.true., 1.0_wp, 0.5_wp), &
-         overlap_measure_t(.true., 0.0_wp, 1.0_wp), &
-         overlap_measure_t(.true., 1.0_wp, 1.0_wp)]
+      type(overlap_measure_t), parameter :: all_measures(0:2) = [true_area, effective_area, area_per_length]
 
       measure_of = all_measures(modulo(k, size(all_measures)))
       measure_of%with_area = .true.

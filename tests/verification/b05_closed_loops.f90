@@ -48,8 +48,7 @@ contains
    subroutine run_closed_loops(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      character(len=15), parameter :: with_energy(4) = [character(len=15) :: 'polar', 'conservative', 'own_length', &
-                                                        'effective_polar']
+      character(len=12), parameter :: with_energy(2) = [character(len=12) :: 'polar', 'conservative']
       character(len=:), allocatable :: name
       real(wp) :: coarse, fine
       integer :: j, k

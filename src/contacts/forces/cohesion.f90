@@ -13,8 +13,8 @@
 !>     W = (E d^2/2)/(1 - s^2/3),    moment/force = (w s/6)/(1 - 2 s^2/3),
 !>
 !> for a bed of springs w s/6. At s = 1 an edge opens. So a face without a load bears the moment c w^2/2 before. A part
-!> a of the width that is left bears c a^2/2: the elastic force of a wedge passes through its tip. With the law of the
-!> own length it passes at a/3, as that of a bed of springs does, which leaves c w^2/6. With the conservative law
+!> a of the width that is left bears c a^2/2: the elastic force of a wedge passes through its tip. (That of a bed of
+!> springs passes at a/3, which leaves c w^2/6.) With the conservative law
 !>
 !>     W = (E w^2/(l b)) (d^2/2) sqrt((1 + s^2) (1 - s^2/3)),    moment/force = w s (1 - s^2)/(6 + 2 s^2),
 !>
@@ -99,7 +99,7 @@ contains
    !> Add upper bounds of the stiffness. Each crossing of the outlines, where the overlap has the angle f, is a spring
    !> of at most (c/2) tan(f/2) in all directions: the second derivative of the area is the product of the shifts along
    !> both normals over sin f. There are two, half a chord from the middle, and the chord is at most 2 L (at a corner
-   !> with the polar laws). Edges that are nearly parallel have more, but only on a way that is shorter than the depth
+   !> with the polar law). Edges that are nearly parallel have more, but only on a way that is shorter than the depth
    !> by the same factor.
    subroutine stiffen(self, element)
       class(cohesion_t), intent(in) :: self

@@ -1,19 +1,24 @@
 !> Elastic forces with a potential W, where G is the effective area of the overlap (`effective_area`), A its area and L
 !> its length (`overlap_measure`):
 !>
-!>     conservative       E G^2/(2 l b)
-!>     own_length         E G^2/(2 l L)
 !>     polar              E A^2/(2 L^2)      the default of the namelist
-!>     effective_polar    E G^2/(2 L^2)
+!>     conservative       E G^2/(2 l b)
 !>
-!> The first one: with N and M of `effective_area`, dG/dt = N . (v1 - v2) + M1 w1 - M2 w2. With W' = dW/dG = E G/(l b),
-!> the first body feels the force -W' N and the torque -W' M1, the second body W' N and W' M2. The work on every closed
-!> path is zero, and momentum and angular momentum are conserved. (Y. T. Feng, Comput. Methods Appl. Mech. Eng. 373
-!> (2021), makes the energy of a contact a function of its volume. A function of the area alone does not resist tilts of
-!> a face, because the area is constant while the corners stay inside. The effective area is our own. It includes the
-!> second moments.)
+!> With the polar law a face of the width w and the depth d has the stiffness E against approach, whatever its width and
+!> the bodies, and w^2/12 of it against tilts. A corner is a linear spring, too: a right angle has 0.375 E. A/L is about
+!> the least distance by which the overlap can be undone, and the law pushes there: an overlap deeper than 0.6 of the
+!> width of a thin end pushes the end aside, and a thin body that is inside another with more than a fifth of its area
+!> may be pulled in. The guard `overlap` warns long before.
 !>
-!> The force equals that of a pressure p(x) = W' G/4 (x - c)^T S^-1 (x - c) on the outline. A face of width w and depth
+!> The conservative law: with N and M of `effective_area`, dG/dt = N . (v1 - v2) + M1 w1 - M2 w2. With W' = dW/dG =
+!> E G/(l b), the first body feels the force -W' N and the torque -W' M1, the second body W' N and W' M2. The work on
+!> every closed path is zero, and momentum and angular momentum are conserved. The polar law has the same form, with A
+!> and L^2 in the place of G and l b, and N and M with the weight of its measure. (Y. T. Feng, Comput. Methods Appl.
+!> Mech. Eng. 373 (2021), makes the energy of a contact a function of its volume. A function of the area alone does not
+!> resist tilts of a face, because the area is constant while the corners stay inside. The effective area is our own. It
+!> includes the second moments.)
+!>
+!> Its force equals that of a pressure p(x) = W' G/4 (x - c)^T S^-1 (x - c) on the outline. A face of width w and depth
 !> d acts like a bed of springs: its stiffness against approach is E w^2/(l b), and against tilts w^2/12 of that while
 !> tilts are small against d/w. The tilt stiffness falls when a corner leaves; the force stays continuous. Corners are
 !> softer, F ~ d^3. (p has its minimum in the middle of a face. Only its sum and its moment are physical, not its
@@ -22,16 +27,6 @@
 !> l and b are constants of the pair: l = 2 s1 s2/(s1 + s2) and b = min(s1, s2), where s is the side of the square of a
 !> body's area. Two equal squares face to face have the stiffness E, and a square on a large plate has E/2. Two bars of
 !> length a and height h have E a/h side to side and E h/a end to end, as with the area law.
-!>
-!> The others have l L or L^2 in the place of l b, and N and M with the weight of their measure. The stiffness of a face
-!> of the width w against approach is E w/l with `own_length`, and E with the polar laws, whatever its width and the
-!> bodies. Corners have F ~ d^2 with `own_length`. With the polar laws they are linear springs: a right angle has
-!> 0.375 E, with G 0.433 E. Tilts of a face meet w^2/12 of its stiffness, w^2/6 with `effective_polar`, 1.5 w^2/12 with
-!> `own_length`.
-!>
-!> A/L is about the least distance by which the overlap can be undone, and the polar laws push there: an overlap deeper
-!> than 0.6 of the width of a thin end pushes the end aside, and a thin body that is inside another with more than a
-!> fifth of its area may be pulled in. The guard `overlap` warns long before.
 !>
 !> Where one body is inside the other, or bars cross, G is that of the body or of the common parallelogram. It does not
 !> depend on small shifts, so the potential gives no force and no direction (crossed bars get their torque). Such a
@@ -44,7 +39,7 @@ module polydem_conservative_law
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
-   use polydem_overlap_measure, only: effective_area, overlap_measure_t
+   use polydem_overlap_measure, only: overlap_measure_t
    use polydem_pair_entries, only: at_stiffness
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
@@ -53,7 +48,7 @@ module polydem_conservative_law
    private
    public :: conservative_law_t
 
-   !> A law with a potential: the polar law, the default of the namelist, or another
+   !> A law with a potential: by its measure of overlaps, the polar or the conservative law
    type, extends(force_part_t) :: conservative_law_t
       !> Young's modulus in two dimensions E [N/m2]
       type(pair_value_t) :: stiffness
@@ -69,11 +64,6 @@ module polydem_conservative_law
       procedure :: static_depth
    end type conservative_law_t
 
-   !> Measures of the laws with the length of the overlap
-   type(overlap_measure_t), parameter :: effective_per_root = overlap_measure_t(.true., 1.0_wp, 0.5_wp)
-   type(overlap_measure_t), parameter :: area_per_length = overlap_measure_t(.true., 0.0_wp, 1.0_wp)
-   type(overlap_measure_t), parameter :: effective_per_length = overlap_measure_t(.true., 1.0_wp, 1.0_wp)
-
 contains
 
    !> Copy the parameters from the settings.
@@ -82,19 +72,10 @@ contains
       type(forces_settings_t), intent(in) :: settings
       type(pair_parameters_t), intent(in) :: pairs
 
+      associate (unused => settings)
+      end associate
       self%stage = stage_elastic
-      select case (settings%law)
-      case ('own_length')
-         self%overlap_measure = effective_per_root
-      case ('polar')
-         self%overlap_measure = area_per_length
-         self%steepening = 4.5_wp
-      case ('effective_polar')
-         self%overlap_measure = effective_per_length
-         self%steepening = 3.0_wp
-      case default
-         self%overlap_measure = effective_area
-      end select
+      if (self%overlap_measure%per_length) self%steepening = 4.5_wp
       self%energy_is_known = .true.
       self%logged = [at_stiffness]
       self%stiffness = pairs%stiffness
@@ -168,7 +149,7 @@ contains
       call self%stiffness%scale(block%n, block%material, block%inverse_length)
    end subroutine add
 
-   !> Find the reciprocal of l b, l L or L^2 of each contact.
+   !> Find the reciprocal of l b or L^2 of each contact.
    pure subroutine find_squares(measure, inverse_size, one, other, block, inverse_square)
       type(overlap_measure_t), intent(in) :: measure
       !> Reciprocal side of the square of the area of each piece [1/m]
@@ -181,13 +162,9 @@ contains
       real(wp) :: p, q
       integer(ip) :: c
 
-      if (measure%power >= 1.0_wp) then
+      if (measure%per_length) then
          do c = 1_ip, block%n
             inverse_square(c) = 1.0_wp/block%length_square(c)
-         end do
-      else if (measure%power > 0.0_wp) then
-         do c = 1_ip, block%n
-            inverse_square(c) = 0.5_wp*(inverse_size(one(c)) + inverse_size(other(c)))/sqrt(block%length_square(c))
          end do
       else
          do c = 1_ip, block%n
@@ -202,7 +179,7 @@ contains
    pure subroutine add_of(stiffness, inverse_square, block)
       !> Young's modulus [N/m2]
       real(wp), intent(in) :: stiffness
-      !> Reciprocal of l b, l L or L^2 of each contact [1/m2]
+      !> Reciprocal of l b or L^2 of each contact [1/m2]
       real(wp), intent(in) :: inverse_square(block_size)
       type(contact_block_t), intent(inout) :: block
       real(wp) :: moment_first, moment_second, nearer, force
@@ -232,22 +209,19 @@ contains
    !> that of a face, K_n L^2/12. (This is no bound for rotations; none of 2600 random contacts of all kinds had a
    !> frequency more than 8 % above it.)
    !>
-   !> For the other laws there is no proof, but the greatest eigenvalue of the second derivatives of W, of 12000 random
-   !> shallow contacts of all kinds. In units of that of K_n and K_n L^2/12 together it is at most 1.5 with
-   !> `own_length`. With the polar laws it exceeds 4.3 (3.0 with G) in one of a thousand, where corners come and go, at
-   !> most 6.5 (4.5). In one of a hundred it exceeds 1.9 (1.6).
+   !> For the polar law there is no proof, but the greatest eigenvalue of the second derivatives of W, of 12000 random
+   !> shallow contacts of all kinds. In units of that of K_n and K_n L^2/12 together it exceeds 1.9 in one of a hundred
+   !> and 4.3 in one of a thousand, where corners come and go; it is at most 6.5.
    !>
-   !> An expected contact is one of two equal bodies, where l b is the area. Every face then has the ratio 1 with the
-   !> polar laws, and w/l with `own_length`, the root of that of the conservative law.
+   !> An expected contact is one of two equal bodies, where l b is the area. With the polar law every face has the
+   !> ratio 1.
    subroutine stiffen(self, element)
       class(conservative_law_t), intent(in) :: self
       !> The contact; stiffness against approach and tilts changes, and its ratio if it is an expected contact
       type(linearised_contact_t), intent(inout) :: element
 
       if (element%is_expected) then
-         element%ratio = element%square_ratio
-         if (self%overlap_measure%power > 0.0_wp) element%ratio = sqrt(element%ratio)
-         if (self%overlap_measure%power >= 1.0_wp) element%ratio = 1.0_wp
+         element%ratio = merge(1.0_wp, element%square_ratio, self%overlap_measure%per_length)
          element%ratio = element%ratio*self%stiffness%factor_of(element%materials)
          element%normal_stiffness = element%normal_stiffness + self%steepening*(self%stiffness%one*element%ratio)
       else
@@ -258,30 +232,29 @@ contains
    end subroutine stiffen
 
    !> Depth at which a flat contact of width w carries a block at rest, F l b/(E w^2) [m], where l = 2 s1 s2/(s1 + s2),
-   !> b = min(s1, s2), and s is the side of the square of a body's area. The other laws have l L or L^2 with
-   !> L^2 = w^2 + d^2 instead of l b, and a force that is smaller by s d^2/L^2 for the power s of L.
+   !> b = min(s1, s2), and s is the side of the square of a body's area. The polar law has L^2 = w^2 + d^2 instead of
+   !> l b, and a force that is smaller by d^2/L^2.
    real(wp) function static_depth(self, block) result(depth)
       class(conservative_law_t), intent(in) :: self
       type(resting_block_t), intent(in) :: block
-      real(wp) :: s1, s2, length, square, first
+      real(wp) :: s1, s2, square, share, first
       integer :: k
 
-      s1 = sqrt(block%width*block%height)
-      s2 = sqrt(block%support_width*block%support_height)
-      depth = block%load/(self%stiffness%of(block%materials)*block%width) &
-         *(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block%width))
-      associate (power => self%overlap_measure%power)
-         if (.not. power > 0.0_wp) return
-         length = 2.0_wp*s1*s2/(s1 + s2)
-         if (power >= 1.0_wp) length = block%width
-         first = block%load/self%stiffness%of(block%materials)*(length/block%width)
+      if (self%overlap_measure%per_length) then
+         first = block%load/self%stiffness%of(block%materials)
          depth = first
          do k = 1, 12
             square = 1.0_wp + (depth/block%width)**2
-            depth = first*square**power/(1.0_wp - power*(1.0_wp - 1.0_wp/square))
+            share = 1.0_wp - 1.0_wp/square
+            depth = first*square/(1.0_wp - share)
             if (.not. depth < block%height) return
          end do
-      end associate
+      else
+         s1 = sqrt(block%width*block%height)
+         s2 = sqrt(block%support_width*block%support_height)
+         depth = block%load/(self%stiffness%of(block%materials)*block%width) &
+            *(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block%width))
+      end if
    end function static_depth
 
 end module polydem_conservative_law

@@ -122,7 +122,7 @@ contains
          associate (part => law%parts(k)%part)
             if (part%stage == stage_elastic) then
                law%overlap_measure = part%overlap_measure
-               law%needs_shares = law%needs_shares .or. part%overlap_measure%joins()
+               law%needs_shares = law%needs_shares .or. part%overlap_measure%per_length
             end if
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist

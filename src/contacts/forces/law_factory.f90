@@ -15,6 +15,7 @@ module polydem_law_factory
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t
+   use polydem_overlap_measure, only: area_per_length, effective_area
    use polydem_pair_parameters, only: pair_parameters, pair_parameters_t, uniform_parameters
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: restitution_damping_t
@@ -52,10 +53,9 @@ contains
       if (.not. present(pairs)) law%pairs = uniform_parameters(settings)
       associate (s => settings)
          if (s%law == 'area') call law%add(area_law_t(name='area law'), s)
-         if (s%law == 'conservative') call law%add(conservative_law_t(name='conservative law'), s)
-         if (s%law == 'own_length') call law%add(conservative_law_t(name='law of the own length'), s)
-         if (s%law == 'polar') call law%add(conservative_law_t(name='polar law'), s)
-         if (s%law == 'effective_polar') call law%add(conservative_law_t(name='effective polar law'), s)
+         if (s%law == 'conservative') &
+            call law%add(conservative_law_t(name='conservative law', overlap_measure=effective_area), s)
+         if (s%law == 'polar') call law%add(conservative_law_t(name='polar law', overlap_measure=area_per_length), s)
          if (s%damping == 'rate') then
             if (s%restitution > 0.0_wp) then
                call law%add(restitution_damping_t(name='damping of given restitution'), s)

@@ -17,7 +17,7 @@ module polydem_rigidity
    !> Coefficient and exponent of the errors of a law
    type :: fit_t
       !> Name of the law, with which the description of the parts begins
-      character(len=21) :: name
+      character(len=16) :: name
       !> Coefficient and exponent of tipping, (2)
       real(wp) :: tipping(2)
       !> Those of an impact on a corner, (2)
@@ -26,12 +26,10 @@ module polydem_rigidity
 
    real(wp), parameter :: third = 1.0_wp/3.0_wp
    !> Fits of all laws
-   type(fit_t), parameter :: fits(5) = [ &
+   type(fit_t), parameter :: fits(3) = [ &
       fit_t('polar law', [9.7_wp, 1.0_wp], [3.35_wp, 0.5_wp]), &
-      fit_t('effective polar law', [8.4_wp, 1.0_wp], [3.2_wp, 0.5_wp]), &
       fit_t('conservative law', [4.7_wp, 0.25_wp], [4.2_wp, 0.3_wp]), &
-      fit_t('area law', [5.45_wp, third], [2.7_wp, 0.45_wp]), &
-      fit_t('law of the own length', [4.4_wp, third], [2.1_wp, 0.44_wp])]
+      fit_t('area law', [5.45_wp, third], [2.7_wp, 0.45_wp])]
 
 contains
 

@@ -23,7 +23,7 @@ LOOKS = {
 }
 
 #: Elastic law -> line
-LAWS = {"area": "--", "conservative": "-"}
+LAWS = {"area": "--", "polar": "-"}
 
 
 def precision_drawings(study: WorkPrecision) -> list[Drawing]:
@@ -95,7 +95,7 @@ def _limit(axis, curves: list, floor: float) -> None:
 
 
 def energy_drift(study: WorkPrecision) -> Drawing | None:
-    """Model error and integration error of the energy, apart: the conservative law against the area law."""
+    """Model error and integration error of the energy, apart: the polar law against the area law."""
     curves = [curve for curve in study.curves if curve.scene == "gas" and curve.precision == "double"]
     if not curves:
         return None
@@ -107,7 +107,7 @@ def energy_drift(study: WorkPrecision) -> Drawing | None:
                   marker=marker, markersize=4.0, label=f"{law}, {curve.numerics}")
     dt = np.array([p.dt for curve in curves for p in curve.points])
     ends = np.array([dt.min(), dt.max()])
-    smooth = [p for c in curves if c.model.startswith("conservative") for p in c.points]
+    smooth = [p for c in curves if c.model.startswith("polar") for p in c.points]
     if smooth:
         lowest = min(smooth, key=lambda p: p.dt)
         left.plot(ends, lowest.rms * (ends / lowest.dt) ** 2, color="0.6", linewidth=0.8, label="second order")
@@ -118,13 +118,13 @@ def energy_drift(study: WorkPrecision) -> Drawing | None:
     return Drawing(
         "workprecision_energy_drift", figure,
         "Elastic gas without friction. Left: root mean square of the change of the kinetic energy over all moments "
-        "without a contact. With the conservative law it is the error of the integration and falls with the step; with "
+        "without a contact. With the polar law it is the error of the integration and falls with the step; with "
         "the area law it is that of the model and stays. Right: the change over time, velocity Verlet.",
     )
 
 
 def _draw_drifts(axis, curves: list) -> None:
-    shades = {"area": ("#D55E00", "#E69F00"), "conservative": ("#0072B2", "#56B4E9")}
+    shades = {"area": ("#D55E00", "#E69F00"), "polar": ("#0072B2", "#56B4E9")}
     for curve in curves:
         if curve.numerics != "velocity_verlet":
             continue

@@ -50,7 +50,7 @@ class Model:
         return f"{self.law}/{self.damping}/{self.friction}"
 
     def overrides(self) -> list[str]:
-        """Entries for --set; an elastic law that is the program's default is left to it."""
+        """Entries for --set; the inputs have the area law."""
         entries = [f"forces.damping={self.damping}", f"forces.friction={self.friction}"]
         if self.law != "area":
             entries.append(f"forces.law={self.law}")
@@ -299,10 +299,7 @@ def restitution(model: Model) -> float | None:
     """
     if model.damping == "none":
         return 1.0
-    stiffness = 1.0  # over E: both bodies are as thick as the square is wide
-    if model.law == "conservative":  # w^2/(l b) with the sides of squares of the areas of both bodies
-        stiffness = 0.5 * (1.0 + math.sqrt(1.0 / 3.0))
-    zeta = 0.5 * DAMPING["rate"] * math.sqrt(stiffness)
+    zeta = 0.5 * DAMPING["rate"]  # a face is as stiff as E, whatever its width
     s = math.sqrt(1.0 - zeta**2)
     e = math.exp(-zeta / s * (math.pi - math.atan2(2.0 * zeta * s, 1.0 - 2.0 * zeta**2)))
     if model.damping == "rate":
@@ -314,7 +311,7 @@ def restitution(model: Model) -> float | None:
         tau = math.atan2(s * x, v + zeta * x) / s
         return e * math.exp(zeta * tau) * math.hypot(s * x, v + zeta * x)
     if model.damping == "hunt_crossley":
-        rate = DAMPING["hunt_crossley"] * math.sqrt(DENSITY * SIDE**2 / STIFFNESS) * stiffness / SIDE
+        rate = DAMPING["hunt_crossley"] * math.sqrt(DENSITY * SIDE**2 / STIFFNESS) / SIDE
         return _hunt_crossley(rate * SPEED)
     return None
 
@@ -342,36 +339,36 @@ SCENES = {
     for scene in [
         Scene("flat_impact", "Flat impact", "velocity after the impact",
               _models("area/none/none", "area/rate/none", "area/matuttis_chen/none", "area/hunt_crossley/none",
-                      "conservative/none/none", "conservative/rate/none", "conservative/hunt_crossley/none"),
+                      "polar/none/none", "polar/rate/none", "polar/hunt_crossley/none"),
               _doubled(8, 6), 4096, velocities_after, flat_impact,
               quantity=lambda result: float(result[-1, :, 1].mean()), quantity_name="restitution",
               target=restitution),
         Scene("corner_impact", "Corner impact", "velocity after the impact",
-              _models("area/none/none", "area/rate/none", "area/hunt_crossley/none", "conservative/none/none",
-                      "conservative/hunt_crossley/none"),
+              _models("area/none/none", "area/rate/none", "area/hunt_crossley/none", "polar/none/none",
+                      "polar/hunt_crossley/none"),
               _doubled(64, 6), 16384, velocities_after, corner_impact,
               quantity=lambda result: float(result[-1, :, 1].mean()), quantity_name="restitution",
               target=lambda model: 1.0 if model.damping == "none" else None),
         Scene("oblique_impact", "Oblique impact", "velocity after the impact",
               _models("area/rate/none", "area/rate/cundall_strack", "area/hunt_crossley/cundall_strack",
-                      "conservative/rate/cundall_strack", "conservative/hunt_crossley/cundall_strack",
+                      "polar/rate/cundall_strack", "polar/hunt_crossley/cundall_strack",
                       "area/rate/exact"),
               _doubled(64, 6), 16384, velocities_after, oblique_impact),
         Scene("sliding_block", "Sliding block", "way until rest",
-              _models("area/rate/cundall_strack", "conservative/rate/cundall_strack",
-                      "conservative/hunt_crossley/cundall_strack", "area/rate/exact"),
+              _models("area/rate/cundall_strack", "polar/rate/cundall_strack",
+                      "polar/hunt_crossley/cundall_strack", "area/rate/exact"),
               _doubled(256, 6), 32768, ways, sliding_block,
               quantity=lambda result: float(result[-1].mean()), quantity_name="way over v^2/(2 mu g)",
               target=lambda model: 1.0),
         Scene("stack", "Stack", "sinking of the blocks",
               _models("area/rate/none", "area/rate/cundall_strack", "area/hunt_crossley/none",
-                      "conservative/rate/none"),
+                      "polar/rate/none"),
               _doubled(80, 6), 10240, sinking, stack),
         Scene("drum", "Drum", "position of the grains",
               _models("area/rate/cundall_strack", "area/hunt_crossley/cundall_strack",
-                      "conservative/rate/cundall_strack", "area/rate/exact"),
+                      "polar/rate/cundall_strack", "area/rate/exact"),
               _doubled(2048, 4), 65536, grain_positions, moments=8),
-        Scene("gas", "Elastic gas", "kinetic energy", _models("area/none/none", "conservative/none/none"),
+        Scene("gas", "Elastic gas", "kinetic energy", _models("area/none/none", "polar/none/none"),
               _doubled(3600, 5), 0, energy_changes, gas, moments=100),
     ]
 }
