@@ -282,8 +282,8 @@ def pair_module(rows):
                      f"{takes}   end subroutine take_{group}\n")
     mixes = "".join(f"      mixed({k}) = {MIXED[row.mixed].format(a=f'a({k})', b=f'b({k})')}\n"
                     for k, row in enumerate((row for row in rows if row.mixed), 1))
-    parts.append("   !> Numbers of the contacts of two materials. Equal ones are not changed, not even by rounding, and both\n"
-                 "   !> orders give the same bits.\n   pure function mixed_values(a, b) result(mixed)\n"
+    parts.append("   !> Numbers of the contacts of two materials. Equal ones are not changed, not even by rounding, and\n"
+                 "   !> both orders give the same bits.\n   pure function mixed_values(a, b) result(mixed)\n"
                  "      !> Numbers of both materials\n"
                  "      real(wp), intent(in) :: a(n_pair_entries), b(n_pair_entries)\n"
                  "      real(wp) :: mixed(n_pair_entries)\n\n"

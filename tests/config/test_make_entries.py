@@ -113,7 +113,7 @@ class TestMakeEntries(unittest.TestCase):
                                   ("| Height", "| Height | < three: in mm?", "line 12: < three: in mm. is no usual"),
                                   ("| Height", "| Height | < 3", "line 12: < 3 is no usual range of height"),
                                   ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type"),
-                                  ("| Height", "| Height | - | smaller one", "line 12: height is not mixed: smaller one")):
+                                  ("| Height", "| Height | - | smaller one", "line 12: height is not mixed: smaller")):
             with self.assertRaisesRegex(TableError, message):
                 read_table(GOOD.replace(old, new))
 

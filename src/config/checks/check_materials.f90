@@ -69,8 +69,8 @@ contains
       associate (value => group%values(row_of(group, 'restitution')))
          if (.not. (value%is_given .and. value%is_active)) return
          if (value%reals(1) < least_restitution) call raise(error, input_error, value%place// &
-            ': ''restitution'' in &'//trim(group%group)//' must be at least 0.01, because a smaller value needs a very '// &
-            'small time step; give ''damping_coefficient'' instead')
+            ': ''restitution'' in &'//trim(group%group)//' must be at least 0.01, because a smaller value needs a '// &
+            'very small time step; give ''damping_coefficient'' instead')
       end associate
    end subroutine check_restitution
 

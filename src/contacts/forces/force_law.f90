@@ -8,7 +8,7 @@ module polydem_force_law
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_errors, only: error_t
-   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic, stage_on_damping
+   use polydem_force_part, only: force_part_t, resting_block_t, softness_fit_t, stage_elastic, stage_on_damping
    use polydem_kinds, only: ip, wp
    use polydem_overlap_measure, only: overlap_measure_t
    use polydem_pair_entries, only: n_pair_entries
@@ -34,6 +34,8 @@ module polydem_force_law
       class(velocity_constraint_t), allocatable :: constraint
       !> First columns of the contact history, in this order; not allocated before `choose_parts`
       type(history_kind_t), allocatable :: history_kinds(:)
+      !> How far the law is from rigid
+      type(softness_fit_t) :: fit
       !> How the law measures overlaps
       type(overlap_measure_t) :: overlap_measure
       !> Whether a part adds to the column `cohesion`
@@ -122,6 +124,7 @@ contains
          associate (part => law%parts(k)%part)
             if (part%stage == stage_elastic) then
                law%overlap_measure = part%overlap_measure
+               law%fit = part%fit
                law%needs_shares = law%needs_shares .or. part%overlap_measure%per_length
             end if
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion

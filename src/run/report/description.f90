@@ -7,6 +7,7 @@ module polydem_description
    use polydem_namelist_entries, only: entries, first_row
    use polydem_overlap_table, only: write_overlap_table
    use polydem_pair_entries, only: n_pair_entries, pair_entries
+   use polydem_pair_value, only: pair_value_t
    use polydem_pair_values, only: parameter_at
    use polydem_result_files, only: overlaps_name
    use polydem_run_duration, only: longest_run
@@ -238,16 +239,16 @@ contains
       integer(ip), intent(in) :: materials(2)
       character(len=:), allocatable :: text
 
+      type(pair_value_t) :: value
       integer :: k
 
       text = ''
       do k = 1, n_pair_entries
          if (.not. simulation%law%logged(k)) cycle
-         associate (value => parameter_at(simulation%law%pairs, k), &
-                    unit => entries(first_row('forces', trim(pair_entries(k))))%unit)
-            if (text /= '') text = text//', '
-            text = text//trim(pair_entries(k))//' '//to_text(value%of(materials), 3)//trim(' '//unit)
-         end associate
+         value = parameter_at(simulation%law%pairs, k)
+         if (text /= '') text = text//', '
+         text = text//trim(pair_entries(k))//' '//to_text(value%of(materials), 3)// &
+            trim(' '//entries(first_row('forces', trim(pair_entries(k))))%unit)
       end do
    end function pair_text
 
