@@ -16,7 +16,8 @@ from pathlib import Path
 Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual mixed")
 #: Fields that may be left out at the end of a row
 LATE = 2
-Group = namedtuple("Group", "meaning is_repeatable")
+#: A group, whether a file may contain it several times, and the name and the rows of the block that it includes
+Group = namedtuple("Group", "meaning is_repeatable block rows", defaults=("", ()))
 #: Components: the Fortran type of one value and its value before it is filled
 TYPES = {"real": ("real(wp)", "0.0_wp"), "integer": ("integer(ip)", "0_ip"), "logical": ("logical", ".false.")}
 TEXTS = ("word", "path", "name")
@@ -44,7 +45,7 @@ class TableError(Exception):
 
 def read_table(text):
     """Groups by name, and all rows."""
-    groups, lists, rows = {}, {}, []
+    groups, lists, rows, blocks, block = {}, {}, [], {}, ""
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
             continue
@@ -52,27 +53,55 @@ def read_table(text):
         if word == "group":
             name, _, meaning = rest.partition(": ")
             name, mark, _ = name.partition(" *")
-            groups[name] = Group(meaning, mark != "")
+            groups[name], block = Group(meaning, mark != ""), ""
+        elif word == "block":
+            block, _, meaning = rest.partition(": ")
+            blocks[block] = Group(meaning, False)
+        elif word == "include":
+            if rest not in blocks:
+                raise TableError(f"line {number}: there is no block {rest} above it")
+            name = next(reversed(groups))
+            groups[name] = groups[name]._replace(block=rest, rows=blocks[rest].rows)
+            rows += [row._replace(group=name) for row in blocks[rest].rows]
         elif word == "list":
             name, _, words = rest.partition(" = ")
             lists[name] = with_lists(words.strip(), lists, number)
+        elif block:
+            earlier = blocks[block].rows
+            blocks[block] = blocks[block]._replace(rows=(*earlier, read_row(line, lists, number, blocks, earlier)))
         else:
-            fields = ["" if field.strip() == "-" else field.strip() for field in line.split(" | ")]
-            if not len(Row._fields) - LATE <= len(fields) <= len(Row._fields):
-                raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - LATE}")
-            fields += [""] * (len(Row._fields) - len(fields))
-            if not fields[3].isdigit():
-                raise TableError(f"line {number}: {fields[3]} is not a number of values")
-            row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
-            problem = problem_of(row, groups, rows)
-            if problem:
-                raise TableError(f"line {number}: {problem}")
-            rows.append(row)
-    rows = with_pairs(groups, rows)
+            rows.append(read_row(line, lists, number, groups, rows))
+    rows = with_pairs(groups, [row for row in rows if not is_replaced(row, groups, rows)])
     for row in rows:
         if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
             raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def read_row(line, lists, number, groups, earlier):
+    """A row of the last one of the groups, or blocks, behind earlier rows."""
+    fields = ["" if field.strip() == "-" else field.strip() for field in line.split(" | ")]
+    if not len(Row._fields) - LATE <= len(fields) <= len(Row._fields):
+        raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - LATE}")
+    fields += [""] * (len(Row._fields) - len(fields))
+    if not fields[3].isdigit():
+        raise TableError(f"line {number}: {fields[3]} is not a number of values")
+    row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
+    problem = problem_of(row, groups, earlier)
+    if problem:
+        raise TableError(f"line {number}: {problem}")
+    return row
+
+
+def is_included(row, groups):
+    """Whether a row is that of the block that its group includes."""
+    return any(row == other._replace(group=row.group) for other in groups[row.group].rows)
+
+
+def is_replaced(row, groups, rows):
+    """Whether a row of a block is not in use, since the group has rows of its own of the same key."""
+    own = (other for other in rows if (other.group, other.key) == (row.group, row.key))
+    return is_included(row, groups) and not all(is_included(other, groups) for other in own)
 
 
 def with_pairs(groups, rows):
@@ -182,15 +211,22 @@ def component(row):
 def settings_module(groups, rows):
     """One type per group, one of all groups of a run, and one of a bench."""
     body = ""
-    for group, (meaning, _) in groups.items():
-        components = "\n".join(component(row) for row in first_rows(rows, group))
+    blocks = {group.block: group.rows for group in groups.values() if group.block}
+    for block, members in blocks.items():
+        components = "\n".join(component(row) for row in first_rows(members, block))
+        body += (f"   !> Entries that several groups include\n   type :: {block}_settings_t\n{components}\n"
+                 f"   end type {block}_settings_t\n\n")
+    for group, (meaning, _, block, members) in groups.items():
+        common = {row.key for row in members}
+        components = "\n".join(component(row) for row in first_rows(rows, group) if row.key not in common)
         comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
                                 initial_indent="   !> ", subsequent_indent="   !> ")
         base = ", extends(source_locations_t)" if group == BENCH else ""
+        base = f", extends({block}_settings_t)" if block else base
         body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
     body += "   !> All settings of a run. They do not change after reading\n"
     body += "   type, extends(source_locations_t) :: settings_t\n"
-    for group, (_, is_repeatable) in groups.items():
+    for group, (_, is_repeatable, *_) in groups.items():
         if group != BENCH:
             kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
             body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
@@ -198,7 +234,7 @@ def settings_module(groups, rows):
     body += "   end type settings_t\n"
     return module("settings", "Settings of a run and of a bench: one type per namelist group.",
                   ["kinds, only: ip, wp", "source_locations, only: source_locations_t", "strings, only: text_t"],
-                  ["settings_t", *(f"{group}_settings_t" for group in groups)], body)
+                  ["settings_t", *(f"{name}_settings_t" for name in (*blocks, *groups))], body)
 
 
 def assignment(row):
@@ -282,8 +318,8 @@ def pair_module(rows):
                      f"{takes}   end subroutine take_{group}\n")
     mixes = "".join(f"      mixed({k}) = {MIXED[row.mixed].format(a=f'a({k})', b=f'b({k})')}\n"
                     for k, row in enumerate((row for row in rows if row.mixed), 1))
-    parts.append("   !> Numbers of the contacts of two materials. Equal ones are not changed, not even by rounding, and\n"
-                 "   !> both orders give the same bits.\n   pure function mixed_values(a, b) result(mixed)\n"
+    parts.append("   !> Numbers of the contacts of two materials. Equal ones are not changed, not even by rounding,\n"
+                 "   !> and both orders give the same bits.\n   pure function mixed_values(a, b) result(mixed)\n"
                  "      !> Numbers of both materials\n"
                  "      real(wp), intent(in) :: a(n_pair_entries), b(n_pair_entries)\n"
                  "      real(wp) :: mixed(n_pair_entries)\n\n"

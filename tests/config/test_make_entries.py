@@ -102,6 +102,22 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("      !> Glue [N]\n      type(pair_value_t) :: glue\n", value_module(rows))
         self.assertIn("pairs%wear = new_pair_value(table(:, :, 2), one(2))", value_module(rows))
 
+    def test_groups_include_a_block(self):
+        text = ("block size: how large\nsize | way | word | 1 | wide | - | wide high | - | Way\n"
+                "size | width | real | 1 | 2 | m | > 0 | way: wide | Width\n"
+                "group box *: boxes\nbox | name | name | 1 | required | - | - | - | Name\ninclude size\n"
+                "group lid\nlid | width | real | 1 | 3 | m | > 0 | - | Width of the lid\ninclude size\n")
+        groups, rows = read_table(text)
+        self.assertEqual([f"{row.group}.{row.key} {row.default}" for row in rows],
+                         ["box.name required", "box.way wide", "box.width 2", "lid.width 3", "lid.way wide"])
+        made = settings_module(groups, rows)
+        self.assertIn("type :: size_settings_t\n      !> Way\n", made)
+        self.assertIn("type, extends(size_settings_t) :: box_settings_t\n      !> Name\n      character(len=:), "
+                      "allocatable :: name\n   end type", made)
+        self.assertEqual(made.count("real(wp) :: width"), 1)
+        with self.assertRaisesRegex(TableError, "line 6: there is no block sice above it"):
+            read_table(text.replace("include size\ngroup", "include sice\ngroup"))
+
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
                                   ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
