@@ -8,7 +8,7 @@ module polydem_namelist_values
    use polydem_value_advice, only: advice, digits, is_number, no_expression, number_beside, text_at
    implicit none
    private
-   public :: value_t, read_value, value_text, label, is_text, list_text
+   public :: value_t, read_value, value_text, label, is_text, list_text, is_readable
 
    !> Characters of a name
    character(len=*), parameter :: name_characters = &
@@ -130,6 +130,14 @@ contains
          read (text, *) number
       end if
    end subroutine read_real
+
+   !> Whether a text in lower case is a number whose reading neither overflows nor underflows
+   pure logical function is_readable(text)
+      character(len=*), intent(in) :: text
+
+      is_readable = is_number(text)
+      if (is_readable) is_readable = abs(magnitude(text)) <= range(1.0_wp)
+   end function is_readable
 
    !> Whether a text in lower case is nan, inf or infinity, with or without a sign
    pure logical function is_not_finite(text)

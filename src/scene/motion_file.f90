@@ -1,11 +1,11 @@
 !> Reads the table of a motion from a CSV file: a header that names columns, then one row per time.
 module polydem_motion_file
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_errors, only: error_t, input_error, raise, raise_unread
    use polydem_file_status, only: is_stream
    use polydem_file_system, only: exists, is_folder
    use polydem_kinds, only: ip, wp
    use polydem_motion_table, only: greatest_rates, motion_table_t, prepare_table
+   use polydem_namelist_values, only: is_readable
    use polydem_outlines, only: pi
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
@@ -188,7 +188,8 @@ contains
       real(wp), intent(out) :: row(4)
       character(len=:), allocatable, intent(inout) :: problem
       character(len=:), allocatable :: word
-      integer :: first, field, status
+      integer :: first, field
+      logical :: is_good
 
       row = 0.0_wp
       first = 1
@@ -198,12 +199,9 @@ contains
             return
          end if
          call next_field(line, first, word)
-         status = verify(word, '0123456789+-.eEdD')
-         if (word == '') status = 1
-         if (status == 0) read (word, *, iostat=status) row(place(field))
-         if (status == 0 .and. .not. ieee_is_finite(row(place(field)))) status = 1
-         if (status == 0 .and. abs(row(place(field))) > value_limit) status = 1
-         if (status /= 0) then
+         is_good = is_readable(lower_case(word))
+         if (is_good) read (word, *) row(place(field))
+         if (.not. is_good .or. abs(row(place(field))) > value_limit) then
             problem = quoted(printable(word))//' is not a number of at most 1e12'
             return
          end if

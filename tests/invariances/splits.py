@@ -27,6 +27,8 @@ def split(scene, dice, how):
     first, second = scene.copy(), scene.copy()
     shorten(first, 0, step)
     shorten(second, step, scene.steps)
+    if has_idle_wall(first):
+        return None
     forget(second, step)
     # Motions, the turn of gravity and the shift of copies are functions of another time.
     moved = bool({"turning", "sheared"} & scene.tags or scene.named("motion"))
@@ -53,6 +55,14 @@ def shorten(scene, begin, end):
         del scene.groups[f"stage.{name}"]
         for other in [other for other, group in scene.groups.items() if group.get("stage") == name]:
             del scene.groups[other]
+
+
+def has_idle_wall(scene):
+    """Whether a wall has a name that nothing uses any more: the program refuses it."""
+    used = set()
+    for group in scene.groups.values():
+        used |= {group.get("wall"), group.get("opposite"), *group.get("sides", ()), *group.get("ends", ())}
+    return any(name not in used and "vanish_at" not in scene.groups[f"wall.{name}"] for name in scene.named("wall"))
 
 
 def forget(scene, step):

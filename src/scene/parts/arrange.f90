@@ -8,7 +8,7 @@ module polydem_arrange
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice, row_height
    use polydem_obstacles, only: obstacles_t
-   use polydem_outlines, only: contains_all
+   use polydem_outlines, only: contains_point, inner_circle, inner_circle_t
    use polydem_packing, only: pack_grains
    use polydem_polygon, only: mass_properties
    use polydem_random, only: new_random, random_t
@@ -180,6 +180,7 @@ contains
       real(wp), intent(out) :: centres(:, :)
       !> Number of grains that fit
       integer(ip), intent(out) :: n_found
+      type(inner_circle_t) :: circle
       type(obstacles_t) :: obstacles
       type(random_t) :: random
       real(wp), allocatable :: corners(:, :)
@@ -189,6 +190,7 @@ contains
 
       low = minval(region%corners, 2)
       high = maxval(region%corners, 2)
+      circle = inner_circle(region%corners)
       obstacles = region%obstacles
       random = new_random(-1_ip - seed)
       do k = 1_ip, size(centres, 2, kind=ip)
@@ -196,7 +198,7 @@ contains
          do trial = 1, most_trials
             place(1) = random%between(low(1), high(1))
             place(2) = random%between(low(2), high(2))
-            if (.not. contains_all(region%corners, reshape(place, [2, 1]), 0.5_wp*grains%length(k))) cycle
+            if (.not. contains_point(region%corners, circle, place, 0.5_wp*grains%length(k))) cycle
             if (obstacles%leaves(place, 0.5_wp*grains%length(k))) exit
          end do
          if (trial > most_trials) then

@@ -9,7 +9,7 @@ module polydem_place_parts
    use polydem_grains, only: append_grains, draw_grains, greatest_length, most_corners_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_outline_file, only: find_outlines
-   use polydem_outlines, only: are_apart
+   use polydem_outlines, only: inner_circle, inner_circle_t, is_apart, lies
    use polydem_packing, only: rotate_with_walls
    use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: parts_t
@@ -298,20 +298,22 @@ contains
       type(polygon_list_t), intent(in) :: placed
       type(region_t), intent(inout) :: region
       type(problem_t), intent(inout) :: problem
-      real(wp) :: low(2), high(2)
+      type(inner_circle_t) :: circle
+      real(wp) :: low(2), high(2), rounding
       integer(ip) :: k
 
+      rounding = rounding_of(region)
+      circle = inner_circle(region%corners)
       low = minval(region%corners, 2)
       high = maxval(region%corners, 2)
       do k = 1_ip, placed%n
          associate (corners => placed%vertex(:, placed%first(k):placed%first(k + 1_ip) - 1_ip))
             if (any(minval(corners, 2) > high) .or. any(maxval(corners, 2) < low)) cycle
-            if (are_apart(region%corners, corners, rounding_of(region))) cycle
+            if (lies(corners, region%corners, circle, rounding) == is_apart) cycle
             call region%obstacles%add(corners)
          end associate
       end do
-      if (all(group%arrangement /= fills) .and. .not. sizes_differ(group)) return
-      if (group%arrangement == 'random') return
+      if (group%arrangement == 'random' .or. (all(group%arrangement /= fills) .and. .not. sizes_differ(group))) return
       problem%key = 'region'
       if (region%obstacles%polygons%n > 0_ip) then
          problem%text = 'contains other bodies, but '

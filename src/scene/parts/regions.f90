@@ -4,7 +4,8 @@ module polydem_regions
    use polydem_grains, only: greatest_length
    use polydem_kinds, only: ip, wp
    use polydem_namelist_values, only: list_text
-   use polydem_outlines, only: are_apart, as_corners, contains_all, draw_ring, rectangle
+   use polydem_outlines, only: as_corners, draw_ring, inner_circle, inner_circle_t, is_across, is_apart, is_inside, &
+      lies, rectangle
    use polydem_parts, only: parts_t
    use polydem_polygon, only: clean_polygon
    use polydem_polygon_list, only: polygon_list_t
@@ -92,23 +93,27 @@ contains
       type(region_t), intent(inout) :: region
       !> Its text is allocated if a wall crosses the region
       type(problem_t), intent(inout) :: problem
+      type(inner_circle_t) :: circle
       real(wp) :: rounding
       integer(ip) :: k
 
       rounding = rounding_of(region)
+      circle = inner_circle(region%corners)
       associate (corners => region%corners)
          call region%obstacles%start(minval(corners, 2), maxval(corners, 2), 2.0_wp*loose_spacing(group))
          do k = 1_ip, walls%n
             ! The bodies of the wall around a convex region are outside it, behind its edges.
             if (group%region == 'inside' .and. parts%walls(wall_of(k))%name == group%wall) cycle
-            if (are_apart(corners, walls%polygon(k), rounding)) cycle
-            if (contains_all(corners, walls%polygon(k), -rounding)) then
+            select case (lies(walls%polygon(k), corners, circle, rounding))
+            case (is_apart)
+               cycle
+            case (is_inside)
                call region%obstacles%add(walls%polygon(k))
-            else
+            case default
                problem%key = 'region'
                problem%text = 'is crossed by the wall '//parts%walls(wall_of(k))%name//remedy(group, region, walls)
                return
-            end if
+            end select
          end do
       end associate
    end subroutine check_walls
@@ -197,10 +202,11 @@ contains
       type(polygon_list_t), intent(in) :: polygons
       !> Lengths that do not count [m]
       real(wp), intent(in) :: rounding
+      type(inner_circle_t) :: circle
 
+      circle = inner_circle(corners)
       do k = 1_ip, polygons%n
-         if (are_apart(corners, polygons%polygon(k), rounding)) cycle
-         if (.not. contains_all(corners, polygons%polygon(k), -rounding)) return
+         if (lies(polygons%polygon(k), corners, circle, rounding) == is_across) return
       end do
       k = 0_ip
    end function first_crossing

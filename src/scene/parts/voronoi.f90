@@ -7,7 +7,7 @@ module polydem_voronoi
    use polydem_elementary, only: hypotenuse
    use polydem_grain_list, only: grain_t, grains_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_outlines, only: contains_all
+   use polydem_outlines, only: contains_point, inner_circle, inner_circle_t
    use polydem_polygon, only: mass_properties
    use polydem_polygon_list, only: polygon_list_t
    use polydem_random, only: random_t
@@ -97,16 +97,18 @@ contains
       real(wp), intent(in) :: region(:, :)
       type(random_t), intent(inout) :: random
       real(wp), intent(out) :: points(:, :)
+      type(inner_circle_t) :: circle
       real(wp) :: low(2), high(2)
       integer :: k
 
+      circle = inner_circle(region)
       low = minval(region, 2)
       high = maxval(region, 2)
       do k = 1, size(points, 2)
          do
             points(1, k) = random%between(low(1), high(1))
             points(2, k) = random%between(low(2), high(2))
-            if (contains_all(region, points(:, k:k), 0.0_wp)) exit
+            if (contains_point(region, circle, points(:, k), 0.0_wp)) exit
          end do
       end do
    end subroutine draw_points
