@@ -290,7 +290,7 @@ def fill_module(groups, rows):
     used = f"group_instances, only: instance_t, row_of{', store_value' * bool(stores)}"
     return module("fill_groups", "Copies the values of the table of entries to the settings, and those of parts back.",
                   [used, "settings, only: settings_t", *uses],
-                  ["fill_groups", f"fill_{BENCH}", "fill_motion", *stores], "",
+                  ["fill_groups", f"fill_{BENCH}", *stores], "",
                   "\n".join(parts))
 
 
