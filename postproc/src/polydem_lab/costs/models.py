@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from polydem_post.base.emit import FORMATS, SUFFIXES, Table
-from polydem_post.base.result_file import ResultError
+from polydem_post.base.result_file import ResultError, cannot_read
 from polydem_post.read.trajectory import Trajectory
 
 from ..bench.records import read_records, write_records
@@ -155,7 +155,11 @@ class Study:
 
     def scene(self, model: Model) -> str:
         """The namelist of a model, which is written first: the drum at rest, with the groups of the model."""
-        drum = (self.inputs / "bench" / "drum.nml").read_text(encoding="utf-8")
+        bench = self.inputs / "bench" / "drum.nml"
+        try:
+            drum = bench.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise cannot_read(bench, error) from error
         path = self.output.resolve() / "drum.nml"
         path.write_text(MOTION.sub("", drum) + model.groups, encoding="utf-8")
         return str(path)
