@@ -26,9 +26,12 @@ NAMELIST = """! The washer of Box2D's benchmarks: 8100 squares in a turning ring
    name = 'file'
    bodies_file = '{bodies}'
    density = 1              ! kg/m3
-   motion = 'rotation'
-   motion_pivot = 0, 10     ! m
-   motion_rate = 0.0694444  ! revolutions per second, 25 degrees per second
+/
+&motion
+   name = 'turn'
+   kind = 'rotation'
+   pivot = 0, 10            ! m
+   rate = 0.0694444         ! revolutions per second, 25 degrees per second
 /
 &forces
    gravity = 0, -10         ! m/s2

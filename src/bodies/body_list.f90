@@ -299,7 +299,7 @@ contains
          end if
          if (bodies%fixed(s) .and. any(abs([given%velocity, given%angular_velocity]) > 0.0_wp)) then
             call raise(error, input_error, 'body '//to_text(bodies%id(s))//': it is fixed and cannot have a '// &
-                       'velocity or an angular velocity; set motion in &scene of the namelist to move it')
+                       'velocity or an angular velocity; give a group &motion in the namelist to move it')
             return
          end if
          if (.not. allocated(given%first)) call mass_properties(cleaned, area, centroid, second_moment)

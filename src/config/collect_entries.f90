@@ -18,18 +18,14 @@ module polydem_collect_entries
    integer, parameter :: longest_name = 64
 
    !> Keys of &scene that another group calls otherwise: key, group, key of that group
-   character(len=16), parameter :: equal_keys(3, 22) = reshape([character(len=16) :: &
+   character(len=16), parameter :: equal_keys(3, 13) = reshape([character(len=16) :: &
       'bodies', 'grains', 'number', &
       'corners_min', 'grains', 'corners', 'corners_max', 'grains', 'corners', &
       'corners_min', 'source', 'corners', 'corners_max', 'source', 'corners', &
       'corners_min', 'wall', 'corners', 'corners_max', 'wall', 'corners', &
       'long_axis_min', 'grains', 'long_axis', 'long_axis_max', 'grains', 'long_axis', &
       'long_axis_min', 'source', 'long_axis', 'long_axis_max', 'source', 'long_axis', &
-      'slope', 'wall', 'angle', 'wall_material', 'wall', 'material', &
-      'motion', 'motion', 'kind', 'motion_bodies', 'motion', 'bodies', 'motion_pivot', 'motion', 'pivot', &
-      'motion_rate', 'motion', 'rate', 'motion_velocity', 'motion', 'velocity', &
-      'motion_amplitude', 'motion', 'amplitude', 'motion_frequency', 'motion', 'frequency', &
-      'motion_start', 'motion', 'start', 'motion_ramp', 'motion', 'ramp'], [3, 22])
+      'slope', 'wall', 'angle', 'wall_material', 'wall', 'material'], [3, 13])
 
 contains
 
@@ -213,6 +209,11 @@ contains
       select case (statement%group//'.'//statement%key)
       case ('scene.fraction')
          clause = 'solid_fraction in &scene'
+      case ('scene.motion')
+         clause = 'kind in a group &motion'
+      case ('scene.motion_bodies', 'scene.motion_pivot', 'scene.motion_rate', 'scene.motion_velocity', &
+            'scene.motion_amplitude', 'scene.motion_frequency', 'scene.motion_start', 'scene.motion_ramp')
+         clause = statement%key(len('motion_') + 1:)//' in a group &motion'
       case ('integrate.fraction')
          clause = 'safety_factor in &integrate'
       case ('guards.passing')

@@ -1,7 +1,8 @@
 """Make what follows from the table of namelist entries.
 
 make_entries.py ENTRIES.txt FOLDER: the Fortran sources entry_table.f90 (the table as constants), settings.f90 (one type
-per group) and fill_groups.f90 (fills these types).
+per group), fill_groups.f90 (fills these types) and pair_entries.f90 (numbers that pairs of materials may have).
+make_entries.py ENTRIES.txt FOLDER --pairs: pair_values.f90, the type of these numbers in a force law.
 make_entries.py ENTRIES.txt PAGE.md [--check]: the table of the manual, between the lines <!-- entries --> and
 <!-- /entries -->; with --check it must be there already.
 """
@@ -12,8 +13,11 @@ import textwrap
 from collections import namedtuple
 from pathlib import Path
 
-Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual")
-Group = namedtuple("Group", "meaning is_repeatable")
+Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual mixed")
+#: Fields that may be left out at the end of a row
+LATE = 2
+#: A group, whether a file may contain it several times, and the name and the rows of the block that it includes
+Group = namedtuple("Group", "meaning is_repeatable block rows", defaults=("", ()))
 #: Components: the Fortran type of one value and its value before it is filled
 TYPES = {"real": ("real(wp)", "0.0_wp"), "integer": ("integer(ip)", "0_ip"), "logical": ("logical", ".false.")}
 TEXTS = ("word", "path", "name")
@@ -26,6 +30,11 @@ USUAL = re.compile(rf"{BOUND}(?:(?:, | or | / ){BOUND})*: .+")
 BENCH = "bench"
 #: Groups that a recipe makes, which --expand prints
 PARTS = ("grains", "wall")
+#: Groups that have the numbers of &forces that are mixed, and how they say it
+PAIRS = {"material": "; of two materials: {}", "contact_pair": ""}
+#: How numbers a and b of two materials are mixed
+MIXED = {"smaller one": "min({a}, {b})", "mean": "0.5_wp*({a} + {b})", "geometric mean": "sqrt({a})*sqrt({b})",
+         "harmonic mean": "2.0_wp*min({a}, {b})*(max({a}, {b})/({a} + {b}))"}
 #: Longest piece of a text on a line
 WIDTH = 90
 
@@ -36,7 +45,7 @@ class TableError(Exception):
 
 def read_table(text):
     """Groups by name, and all rows."""
-    groups, lists, rows = {}, {}, []
+    groups, lists, rows, blocks, block = {}, {}, [], {}, ""
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
             continue
@@ -44,26 +53,66 @@ def read_table(text):
         if word == "group":
             name, _, meaning = rest.partition(": ")
             name, mark, _ = name.partition(" *")
-            groups[name] = Group(meaning, mark != "")
+            groups[name], block = Group(meaning, mark != ""), ""
+        elif word == "block":
+            block, _, meaning = rest.partition(": ")
+            blocks[block] = Group(meaning, False)
+        elif word == "include":
+            if rest not in blocks:
+                raise TableError(f"line {number}: there is no block {rest} above it")
+            name = next(reversed(groups))
+            groups[name] = groups[name]._replace(block=rest, rows=blocks[rest].rows)
+            rows += [row._replace(group=name) for row in blocks[rest].rows]
         elif word == "list":
             name, _, words = rest.partition(" = ")
             lists[name] = with_lists(words.strip(), lists, number)
+        elif block:
+            earlier = blocks[block].rows
+            blocks[block] = blocks[block]._replace(rows=(*earlier, read_row(line, lists, number, blocks, earlier)))
         else:
-            fields = ["" if field.strip() == "-" else field.strip() for field in line.split(" | ")]
-            if len(fields) not in (len(Row._fields) - 1, len(Row._fields)):
-                raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - 1}")
-            fields += [""] * (len(Row._fields) - len(fields))
-            if not fields[3].isdigit():
-                raise TableError(f"line {number}: {fields[3]} is not a number of values")
-            row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
-            problem = problem_of(row, groups, rows)
-            if problem:
-                raise TableError(f"line {number}: {problem}")
-            rows.append(row)
+            rows.append(read_row(line, lists, number, groups, rows))
+    rows = with_pairs(groups, [row for row in rows if not is_replaced(row, groups, rows)])
     for row in rows:
         if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
             raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def read_row(line, lists, number, groups, earlier):
+    """A row of the last one of the groups, or blocks, behind earlier rows."""
+    fields = ["" if field.strip() == "-" else field.strip() for field in line.split(" | ")]
+    if not len(Row._fields) - LATE <= len(fields) <= len(Row._fields):
+        raise TableError(f"line {number}: {len(fields)} fields, not {len(Row._fields) - LATE}")
+    fields += [""] * (len(Row._fields) - len(fields))
+    if not fields[3].isdigit():
+        raise TableError(f"line {number}: {fields[3]} is not a number of values")
+    row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
+    problem = problem_of(row, groups, earlier)
+    if problem:
+        raise TableError(f"line {number}: {problem}")
+    return row
+
+
+def is_included(row, groups):
+    """Whether a row is that of the block that its group includes."""
+    return any(row == other._replace(group=row.group) for other in groups[row.group].rows)
+
+
+def is_replaced(row, groups, rows):
+    """Whether a row of a block is not in use, since the group has rows of its own of the same key."""
+    own = (other for other in rows if (other.group, other.key) == (row.group, row.key))
+    return is_included(row, groups) and not all(is_included(other, groups) for other in own)
+
+
+def with_pairs(groups, rows):
+    """The rows, and those of the numbers of pairs behind the other ones of their groups."""
+    for group, ending in PAIRS.items():
+        if group in groups:
+            place = max(k for k, row in enumerate(rows) if row.group == group) + 1
+            rows[place:place] = [row._replace(group=group, default="", needs="", mixed="",
+                                              meaning=row.meaning.partition("; ")[0] + ending.format(row.mixed))
+                                 for row in rows if row.mixed]
+    return rows
 
 
 def problem_of(row, groups, earlier):
@@ -74,6 +123,8 @@ def problem_of(row, groups, earlier):
         return f"there is no entry of type {row.type} with {row.count} values"
     if row.usual and (row.type != "real" or not USUAL.fullmatch(row.usual)):
         return f"{row.usual} is no usual range of {row.key}"
+    if row.mixed and (row.mixed not in MIXED or (row.group, row.type, row.count) != ("forces", "real", 1)):
+        return f"{row.key} is not mixed: {row.mixed}"
     same = [other for other in earlier if (other.group, other.key) == (row.group, row.key)]
     if any((other.type, other.count) != (row.type, row.count) for other in same):
         return f"{row.key} has another type in an earlier row"
@@ -160,15 +211,22 @@ def component(row):
 def settings_module(groups, rows):
     """One type per group, one of all groups of a run, and one of a bench."""
     body = ""
-    for group, (meaning, _) in groups.items():
-        components = "\n".join(component(row) for row in first_rows(rows, group))
+    blocks = {group.block: group.rows for group in groups.values() if group.block}
+    for block, members in blocks.items():
+        components = "\n".join(component(row) for row in first_rows(members, block))
+        body += (f"   !> Entries that several groups include\n   type :: {block}_settings_t\n{components}\n"
+                 f"   end type {block}_settings_t\n\n")
+    for group, (meaning, _, block, members) in groups.items():
+        common = {row.key for row in members}
+        components = "\n".join(component(row) for row in first_rows(rows, group) if row.key not in common)
         comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
                                 initial_indent="   !> ", subsequent_indent="   !> ")
         base = ", extends(source_locations_t)" if group == BENCH else ""
+        base = f", extends({block}_settings_t)" if block else base
         body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
     body += "   !> All settings of a run. They do not change after reading\n"
     body += "   type, extends(source_locations_t) :: settings_t\n"
-    for group, (_, is_repeatable) in groups.items():
+    for group, (_, is_repeatable, *_) in groups.items():
         if group != BENCH:
             kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
             body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
@@ -176,7 +234,7 @@ def settings_module(groups, rows):
     body += "   end type settings_t\n"
     return module("settings", "Settings of a run and of a bench: one type per namelist group.",
                   ["kinds, only: ip, wp", "source_locations, only: source_locations_t", "strings, only: text_t"],
-                  ["settings_t", *(f"{group}_settings_t" for group in groups)], body)
+                  ["settings_t", *(f"{name}_settings_t" for name in (*blocks, *groups))], body)
 
 
 def assignment(row):
@@ -232,8 +290,75 @@ def fill_module(groups, rows):
     used = f"group_instances, only: instance_t, row_of{', store_value' * bool(stores)}"
     return module("fill_groups", "Copies the values of the table of entries to the settings, and those of parts back.",
                   [used, "settings, only: settings_t", *uses],
-                  ["fill_groups", f"fill_{BENCH}", "fill_motion", *stores], "",
+                  ["fill_groups", f"fill_{BENCH}", *stores], "",
                   "\n".join(parts))
+
+
+def pair_module(rows):
+    """Numbers of &forces that pairs of materials may have: their names, where they stand, and how they are mixed."""
+    keys = [row.key for row in rows if row.mixed]
+    names = ", &\n".join(f"      '{key}'" for key in keys)
+    body = (f"   !> How many there are\n   integer, parameter :: n_pair_entries = {len(keys)}\n"
+            "   !> Their keys\n   character(len=*), parameter :: pair_entries(n_pair_entries) = &\n"
+            f"      [character(len={max(map(len, keys))}) :: &\n{names}]\n")
+    for k, key in enumerate(keys, 1):
+        body += f"   !> Place of {key}\n   integer, parameter :: at_{key} = {k}\n"
+    common = ", &\n".join(f"         forces%{key}" for key in keys)
+    parts = ["   !> Numbers that are those of all pairs if no group gives others\n"
+             "   pure function common_values(forces) result(values)\n      !> Group &forces\n"
+             "      type(forces_settings_t), intent(in) :: forces\n      real(wp) :: values(n_pair_entries)\n\n"
+             f"      values = [ &\n{common}]\n   end function common_values\n"]
+    for group in PAIRS:
+        takes = "".join(f"      if (allocated(group%{key})) values({k}) = group%{key}\n"
+                        for k, key in enumerate(keys, 1))
+        parts.append(f"   !> Take what a group &{group} gives.\n"
+                     f"   pure subroutine take_{group}(group, values)\n      !> The group\n"
+                     f"      type({group}_settings_t), intent(in) :: group\n"
+                     "      !> The numbers\n      real(wp), intent(inout) :: values(n_pair_entries)\n\n"
+                     f"{takes}   end subroutine take_{group}\n")
+    mixes = "".join(f"      mixed({k}) = {MIXED[row.mixed].format(a=f'a({k})', b=f'b({k})')}\n"
+                    for k, row in enumerate((row for row in rows if row.mixed), 1))
+    parts.append("   !> Numbers of the contacts of two materials. Equal ones are not changed, not even by rounding,\n"
+                 "   !> and both orders give the same bits.\n   pure function mixed_values(a, b) result(mixed)\n"
+                 "      !> Numbers of both materials\n"
+                 "      real(wp), intent(in) :: a(n_pair_entries), b(n_pair_entries)\n"
+                 "      real(wp) :: mixed(n_pair_entries)\n\n"
+                 f"{mixes}      where (abs(a - b) <= 0.0_wp) mixed = a\n   end function mixed_values\n")
+    groups = ["forces", *PAIRS]
+    return module("pair_entries", "Numbers of &forces that pairs of materials may have.",
+                  ["kinds, only: wp", *(f"settings, only: {group}_settings_t" for group in groups)],
+                  ["n_pair_entries", "pair_entries", *(f"at_{key}" for key in keys), "common_values", "mixed_values",
+                   *(f"take_{group}" for group in PAIRS)], body, "\n".join(parts))
+
+
+def value_module(rows):
+    """The type of these numbers in a force law, and what fills it from their table."""
+    pairs = [row for row in rows if row.mixed]
+    components = "".join(f"{component(row._replace(meaning=row.meaning.partition('; ')[0], default='0'))}\n"
+                         .replace(f"real(wp) :: {row.key} = 0.0_wp", f"type(pair_value_t) :: {row.key}")
+                         for row in pairs)
+    body = ("   !> Parameters of contacts, as in the namelist, but for the tangential stiffness: it is in N/m2\n"
+            "   type :: pair_parameters_t\n"
+            "      !> Number of materials besides number 0\n      integer(ip) :: n_materials = 0_ip\n"
+            f"{components}   end type pair_parameters_t\n")
+    sets = "".join(f"      pairs%{row.key} = new_pair_value(table(:, :, {k}), one({k}))\n"
+                   for k, row in enumerate(pairs, 1))
+    cases = "".join(f"      case ({k})\n         value = pairs%{row.key}\n" for k, row in enumerate(pairs, 1))
+    contains = ("   !> Set all parameters.\n   pure subroutine set_parameters(pairs, table, one)\n"
+                "      !> The parameters\n      type(pair_parameters_t), intent(inout) :: pairs\n"
+                "      !> Values of each pair of materials, (0:n, 0:n, parameter)\n"
+                "      real(wp), intent(in) :: table(0:, 0:, :)\n"
+                "      !> Common factor of each parameter if its values differ, positive\n"
+                "      real(wp), intent(in) :: one(:)\n\n"
+                f"      pairs%n_materials = ubound(table, 1, kind=ip)\n{sets}   end subroutine set_parameters\n\n"
+                "   !> A parameter by its place in `pair_entries`\n"
+                "   pure type(pair_value_t) function parameter_at(pairs, place) result(value)\n"
+                "      type(pair_parameters_t), intent(in) :: pairs\n      !> Its place\n"
+                "      integer, intent(in) :: place\n\n"
+                f"      select case (place)\n{cases}      end select\n   end function parameter_at\n")
+    return module("pair_values", "Parameters of contacts that may differ between pairs of materials.",
+                  ["kinds, only: ip, wp", "pair_value, only: new_pair_value, pair_value_t"],
+                  ["pair_parameters_t", "set_parameters", "parameter_at"], body, contains)
 
 
 def manual(rows):
@@ -283,9 +408,14 @@ def main(table, target, *options):
     if target.endswith(".md"):
         update_manual(target, rows, "--check" in options)
         return
+    if "--pairs" in options:
+        made = {"pair_values": value_module(rows)}
+    else:
+        made = {"entry_table": table_module(groups, rows), "settings": settings_module(groups, rows),
+                "fill_groups": fill_module(groups, rows), "pair_entries": pair_module(rows)}
     Path(target).mkdir(parents=True, exist_ok=True)
-    for name, make in (("entry_table", table_module), ("settings", settings_module), ("fill_groups", fill_module)):
-        (Path(target) / f"{name}.f90").write_text(make(groups, rows), encoding="utf-8")
+    for name, text in made.items():
+        (Path(target) / f"{name}.f90").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,12 +13,12 @@ module polydem_read_settings
    use polydem_check_stages, only: check_stages
    use polydem_errors, only: error_t
    use polydem_exclusive_entries, only: resolve_exclusive_entries
-   use polydem_fill_groups, only: fill_bench, fill_groups, fill_motion
+   use polydem_fill_groups, only: fill_bench, fill_groups
    use polydem_group_instances, only: full_name, index_of_instance, instance_t, row_of
    use polydem_namelist_entries, only: bench_group, key_length, keys_of
    use polydem_namelist_tokens, only: source_t
    use polydem_source_locations, only: source_locations_t
-   use polydem_resolve_entries, only: resolve_entries, resolved_text, short_motion
+   use polydem_resolve_entries, only: resolve_entries, resolved_text
    use polydem_settings, only: bench_settings_t, settings_t
    use polydem_text_file, only: read_text_file
    use polydem_unusual_values, only: list_unusual
@@ -73,7 +73,6 @@ contains
          call check_sources(settings, instances, error)
          call check_area(settings, instances, error)
          call check_rectangles(settings, instances, error)
-         call expand_short_motion(instances(index_of_instance(instances, 'scene')), settings, error)
       type is (bench_settings_t)
          call read_values(file_name, text, overrides, .true., settings%source_locations_t, instances, error)
          if (allocated(error)) return
@@ -130,22 +129,6 @@ contains
          end do
       end do
    end subroutine list_places
-
-   !> Make the motion of the group &scene the only one of the run.
-   pure subroutine expand_short_motion(scene, settings, error)
-      !> Group &scene
-      type(instance_t), intent(in) :: scene
-      type(settings_t), intent(inout) :: settings
-      type(error_t), allocatable, intent(inout) :: error
-      type(instance_t) :: motion
-
-      if (allocated(error) .or. settings%scene%motion == 'none') return
-      call short_motion(scene, motion, error)
-      if (allocated(error)) return
-      deallocate (settings%motion)
-      allocate (settings%motion(1))
-      call fill_motion(motion, settings%motion(1))
-   end subroutine expand_short_motion
 
    !> Text without carriage returns and with a line end after the last line
    pure function normalise_line_ends(text) result(plain)

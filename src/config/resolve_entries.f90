@@ -7,7 +7,7 @@
 module polydem_resolve_entries
    use polydem_collect_entries, only: collect_entries
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_group_instances, only: instance_t, names_of, new_instance, row_of
+   use polydem_group_instances, only: instance_t, names_of, row_of
    use polydem_kinds, only: ip, wp
    use polydem_missing_entries, only: example_of, missing_text
    use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, required
@@ -17,7 +17,7 @@ module polydem_resolve_entries
    use polydem_strings, only: join, count_words, quoted, split_words, suggestion
    implicit none
    private
-   public :: resolve_entries, resolved_text, short_motion, write_group, check_reference
+   public :: resolve_entries, resolved_text, write_group, check_reference
 
 contains
 
@@ -62,32 +62,6 @@ contains
          end do
       end do
    end subroutine resolve_entries
-
-   !> Make the group &motion of which the entries motion_* of the group &scene are the short form. Its name is empty.
-   pure subroutine short_motion(scene, motion, error)
-      !> Group &scene with its statements
-      type(instance_t), intent(in) :: scene
-      !> Group &motion with its values
-      type(instance_t), intent(out) :: motion
-      type(error_t), allocatable, intent(inout) :: error
-      integer :: row, home
-
-      call new_instance('motion', motion)
-      motion%place = scene%place
-      do row = lbound(motion%values, 1), ubound(motion%values, 1)
-         associate (key => entries(row)%key)
-            if (key == 'name') then
-               call set_unused(motion%place, 0, entries(row), motion%values(row))
-               cycle
-            end if
-            home = first_row('scene', 'motion_'//trim(key))
-            if (key == 'kind') home = first_row('scene', 'motion')
-            if (home > 0 .and. row == first_row('motion', trim(key))) motion%given(row) = scene%given(home)
-         end associate
-         call resolve_row(.false., row, .false., motion, error)
-         if (allocated(error)) return
-      end do
-   end subroutine short_motion
 
    !> Find the value of a row: the given value, or the default.
    pure subroutine resolve_row(of_bench, row, has_stages, instance, error)

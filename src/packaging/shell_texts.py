@@ -1,10 +1,10 @@
 """Tab completion and man page, made from the help texts of the verbs.
 
-usage: shell_texts.py bash|zsh|fish|man VERSION ENTRIES.txt HELP.txt...
+usage: shell_texts.py bash|zsh|fish|man VERSION ENTRIES.md HELP.txt...
 
 A help text has the call of its verb in its first line, the meaning in its second one, and its options below. What a
 help text names is completed, so completion and man page never differ from the help: verbs, options, and the values of
-an option that are listed below it. Entries of the namelist come from the table of all entries.
+an option that are listed below it. Entries of the namelist come from the table of the manual.
 """
 
 import os
@@ -73,15 +73,13 @@ def read_verb(path):
 
 
 def read_entries(path):
-    """Entries of the namelist as `--set` takes them; the name of a group that may be there several times is NAME."""
+    """Entries as `--set` takes them, from the manual; the name of a group that may be there several times is NAME."""
     several, found = set(), {}
-    for line in Path(path).read_text(encoding="utf-8").splitlines():
-        group = re.match(r"group (\w+)( \*)?:", line)
-        fields = [field.strip() for field in line.split("|")]
-        if group and group[2]:
-            several.add(group[1])
-        elif len(fields) == 9 and not line.startswith("#"):
-            found[f"{fields[0]}.{NAME}.{fields[1]}=" if fields[0] in several else f"{fields[0]}.{fields[1]}="] = None
+    page = Path(path).read_text(encoding="utf-8")
+    for group, key, kind in re.findall(r"^\| &(\w+) \| `(\w+)` \| (\w+) ", page, re.MULTILINE):
+        if (key, kind) == ("name", "name"):
+            several.add(group)
+        found[f"{group}.{NAME}.{key}=" if group in several else f"{group}.{key}="] = None
     return tuple(found)
 
 

@@ -178,8 +178,7 @@ contains
       if (motion%wall /= '') ids = ids_of_wall(motion%wall, named)
    end function ids_of
 
-   !> Beginning of a message about the bodies of a motion: they are entries of a wall, of &motion, or of &scene if the
-   !> motion has no name
+   !> Beginning of a message about the bodies of a motion: they are entries of a wall, or of &motion
    pure function origin_of(settings, motion) result(origin)
       type(settings_t), intent(in) :: settings
       type(motion_settings_t), intent(in) :: motion
@@ -187,8 +186,6 @@ contains
 
       if (motion%wall /= '') then
          origin = place_of(settings, 'wall.'//motion%wall, 'bodies')//": 'bodies' in &wall "//motion%wall//': '
-      else if (motion%name == '') then
-         origin = place_of(settings, 'scene', 'motion_bodies')//": 'motion_bodies' in &scene: "
       else
          origin = place_of(settings, 'motion.'//motion%name, 'bodies')//": 'bodies' in &motion: "
       end if

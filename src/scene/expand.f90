@@ -11,7 +11,7 @@ module polydem_expand
    private
    public :: expand_scene
 
-   !> Keys of &scene that are no arguments of a recipe; also all that begin with `motion`
+   !> Keys of &scene that are no arguments of a recipe
    character(len=*), parameter :: common(*) = [character(len=14) :: 'bodies_file', 'seed', 'density', 'material', &
       'wall_material', 'remove_overlap']
 
@@ -63,7 +63,7 @@ contains
          if (index(line, '&') == 1) group = line
          if (group /= '&scene' .or. index(line, ' = ') == 0) cycle
          key = trim(adjustl(line(:index(line, ' = '))))
-         if (any(common == key) .or. index(key, 'motion') == 1) text = text//line//new_line('a')
+         if (any(common == key)) text = text//line//new_line('a')
       end do
       if (text /= '') text = '&scene'//new_line('a')//text//'/'//new_line('a')
    end function scene_text

@@ -95,12 +95,8 @@ contains
       candidate%corners = grains%polygon(1_ip)
       candidate%piece = grains%pieces_of(1_ip)
       associate (s => self%settings)
-         group%sizes = s%sizes
-         group%size_ratio = s%size_ratio
-         group%size_spread = s%size_spread
-         group%grading = s%grading
          if (s%sizes /= 'octaves') then
-            candidate%corners = candidate%corners*size_at(group, random%uniform())
+            candidate%corners = candidate%corners*size_at(s, random%uniform())
          else if (s%size_ratio > 1.0_wp) then
             candidate%corners = candidate%corners/sqrt(1.0_wp - random%uniform()*(1.0_wp - s%size_ratio**(-2)))
          end if
@@ -111,24 +107,13 @@ contains
    !> The shapes of the source as those of a group of grains of one size
    function as_group(self) result(group)
       class(source_t), intent(in) :: self
-      type(grains_settings_t) :: group
+      type(grains_settings_t) :: group, blank
 
-      associate (s => self%settings)
-         group = new_grains(s%name)
-         group%shape = s%shape
-         group%corners = s%corners
-         group%short_axis = s%short_axis
-         group%long_axis = s%long_axis
-         group%diameter = s%diameter
-         group%width = s%width
-         group%height = s%height
-         group%arm = s%arm
-         group%elongation = s%elongation
-         group%outline = s%outline
-         group%outline_corners = s%outline_corners
-         group%outline_pieces = s%outline_pieces
-         group%angle = s%angle
-      end associate
+      blank = new_grains(self%settings%name)
+      group = blank
+      group%shape_settings_t = self%settings%shape_settings_t
+      group%sizes = blank%sizes
+      group%size_ratio = blank%size_ratio
    end function as_group
 
    !> Greatest number of pieces of a body

@@ -5,7 +5,16 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
-from make_entries import TableError, fill_module, manual, read_table, settings_module, table_module  # noqa: E402
+from make_entries import (  # noqa: E402
+    TableError,
+    fill_module,
+    manual,
+    pair_module,
+    read_table,
+    settings_module,
+    table_module,
+    value_module,
+)
 
 GOOD = """# Comment
 list ways = slow fast
@@ -21,6 +30,16 @@ wall | name | name | 1 | required | - | - | - | Name of the wall
 wall | height | real | 1 | 1 | m | - | - | Height
 group bench
 bench | names | path | 0 | - | - | - | - | Names
+"""
+
+PAIRS = """group forces
+forces | glue | real | 1 | 2 | N | > 0 | - | Glue; 0: none | <= 9: in mN? | harmonic mean
+forces | wear | real | 1 | 0 | - | >= 0 | - | Wear | - | smaller one
+group material *: what bodies consist of
+material | name | name | 1 | required | - | - | - | Name
+group contact_pair *: contacts
+contact_pair | name | name | 1 | required | - | - | - | Name
+contact_pair | materials | name | 2 | required | - | material | - | Both
 """
 
 
@@ -66,6 +85,39 @@ class TestMakeEntries(unittest.TestCase):
                       manual(read_table(GOOD.replace("| m | - | - | Height",
                                                      "| m | > 0 | - | Height | <= 3 or > 9: in mm?"))[1]))
 
+    def test_a_number_of_pairs_has_one_row(self):
+        _, rows = read_table(PAIRS)
+        self.assertEqual([row.group + "." + row.key for row in rows if row.key in ("glue", "wear")],
+                         ["forces.glue", "forces.wear", "material.glue", "material.wear", "contact_pair.glue",
+                          "contact_pair.wear"])
+        page = manual(rows)
+        self.assertIn("| &forces | `glue` | real | N | 2 | > 0; usual: <= 9 | | Glue; 0: none |", page)
+        self.assertIn("| &material | `glue` | real | N | | > 0; usual: <= 9 | | Glue; of two materials: harmonic", page)
+        self.assertIn("| &contact_pair | `wear` | real | | | >= 0 | | Wear |", page)
+        made = pair_module(rows)
+        self.assertIn("integer, parameter :: at_wear = 2", made)
+        self.assertIn("mixed(1) = 2.0_wp*min(a(1), b(1))*(max(a(1), b(1))/(a(1) + b(1)))", made)
+        self.assertIn("mixed(2) = min(a(2), b(2))", made)
+        self.assertIn("if (allocated(group%wear)) values(2) = group%wear", made)
+        self.assertIn("      !> Glue [N]\n      type(pair_value_t) :: glue\n", value_module(rows))
+        self.assertIn("pairs%wear = new_pair_value(table(:, :, 2), one(2))", value_module(rows))
+
+    def test_groups_include_a_block(self):
+        text = ("block size: how large\nsize | way | word | 1 | wide | - | wide high | - | Way\n"
+                "size | width | real | 1 | 2 | m | > 0 | way: wide | Width\n"
+                "group box *: boxes\nbox | name | name | 1 | required | - | - | - | Name\ninclude size\n"
+                "group lid\nlid | width | real | 1 | 3 | m | > 0 | - | Width of the lid\ninclude size\n")
+        groups, rows = read_table(text)
+        self.assertEqual([f"{row.group}.{row.key} {row.default}" for row in rows],
+                         ["box.name required", "box.way wide", "box.width 2", "lid.width 3", "lid.way wide"])
+        made = settings_module(groups, rows)
+        self.assertIn("type :: size_settings_t\n      !> Way\n", made)
+        self.assertIn("type, extends(size_settings_t) :: box_settings_t\n      !> Name\n      character(len=:), "
+                      "allocatable :: name\n   end type", made)
+        self.assertEqual(made.count("real(wp) :: width"), 1)
+        with self.assertRaisesRegex(TableError, "line 6: there is no block sice above it"):
+            read_table(text.replace("include size\ngroup", "include sice\ngroup"))
+
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
                                   ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
@@ -76,7 +128,8 @@ class TestMakeEntries(unittest.TestCase):
                                   ("dog | -", "walk | -", "friends of dog is the name of a group walk, which is not"),
                                   ("| Height", "| Height | < three: in mm?", "line 12: < three: in mm. is no usual"),
                                   ("| Height", "| Height | < 3", "line 12: < 3 is no usual range of height"),
-                                  ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type")):
+                                  ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type"),
+                                  ("| Height", "| Height | - | smaller one", "line 12: height is not mixed: smaller")):
             with self.assertRaisesRegex(TableError, message):
                 read_table(GOOD.replace(old, new))
 

@@ -100,7 +100,11 @@ BASE = Names()
 PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "scene.solid_fraction",
                          "integrate.fraction": "integrate.safety_factor", "guards.passing": "guards.tunnelling",
                          "guards.relaxed_depth": "scene.remove_overlap",
-                         "checkpoint.elapsed": "checkpoint.wall_interval"},
+                         "checkpoint.elapsed": "checkpoint.wall_interval",
+                         # The group in the drums of inputs
+                         "scene.motion": "motion.turn.kind",
+                         **{f"scene.motion_{key}": f"motion.turn.{key}" for key in (
+                             "bodies", "pivot", "rate", "velocity", "amplitude", "frequency", "start", "ramp")}},
                 # The settings of a sample, as text; points and normals of contacts, and what follows from points
                 data={"sample/case/input": None, "trajectory/contacts/point": None, "trajectory/contacts/normal": None,
                       **{f"trajectory/series/{name}": None for name in (

@@ -8,7 +8,7 @@ import sys
 
 #: Dense enough for sliding contacts, moving walls and cut walls, and short.
 RUNS = {
-    "drum.nml": ["scene.bodies=400", "scene.motion_start=0", "scene.motion_ramp=0.02", "integrate.dt=2.5e-5",
+    "drum.nml": ["scene.bodies=400", "motion.turn.start=0", "motion.turn.ramp=0.02", "integrate.dt=2.5e-5",
                  "integrate.duration=0.15"],
     "hopper.nml": ["scene.bodies=300", "integrate.dt=1.25e-5", "integrate.duration=0.1"],
     "gas.nml": ["scene.bodies=300", "integrate.dt=1.25e-5", "integrate.duration=0.1"],

@@ -70,7 +70,7 @@ contains
       type(settings_t) :: settings
       character(len=:), allocatable :: text
       character(len=*), parameter :: overrides(*) = [character(len=40) :: 'forces.gravity=1.5e1,2', 'scene.seed=7', &
-         'output.folder=a b', 'neighbours.finder=verlet', 'integrate.dt=1e-5', 'scene.motion_bodies=1,2,3']
+         'output.folder=a b', 'neighbours.finder=verlet', 'integrate.dt=1e-5', 'motion.turn.bodies=1,2,3']
 
       text = trim(overrides(random%whole(1_ip, size(overrides, kind=ip))))
       call damage(random, text)

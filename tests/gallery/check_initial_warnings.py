@@ -28,7 +28,7 @@ DANGERS = (
     ("incline", ("scene.slope=1.047",), "'slope' in &scene is 1.047 degree; usual is >= 1.6: in radian?", 0),
     ("bed", ("forces.friction_coefficient=30",), "an angle of friction in degree?", 0),
     ("bed", ("forces.gravity=0,9.81",), "that of the Earth is 0, -9.81", 0),
-    ("drum", ("scene.motion_rate=30",), "in revolutions per minute, or in rad/s?", 0),
+    ("drum", ("motion.turn.rate=30",), "in revolutions per minute, or in rad/s?", 0),
     ("shaken_bed", ("motion.shake.amplitude=0,5",), "is 5.0 m; usual is >= -0.3, <= 0.3: in mm?", 0),
     ("biaxial", ("stage.shear.above=20",), "'above' in &stage shear is 20.0; usual is <= 3: in %?", 0),
     ("biaxial", ("load.press.stress=-2",), "is -2.0 N/m2; usual is <= -50 or >= 50: in kPa?", 0),

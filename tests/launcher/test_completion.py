@@ -69,11 +69,10 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.completed("polydem", "sweep", ""), {"make", "run", "collect"})
 
     def test_bash_completes_entries_after_set_and_quantities_after_colour(self):
-        rows = [line.split("|")[:2] for line in (LAUNCHER.parent / "src/config/entries.txt").read_text(
-            encoding="utf-8").splitlines() if line.count("|") == 8 and line[0] != "#"]
-        of = {}
-        for group, key in rows:
-            of.setdefault(group.strip(), set()).add(key.strip())
+        page, of = (LAUNCHER.parent / "inputs/entries.md").read_text(encoding="utf-8"), {}
+        for group, key in re.findall(r"^\| &(\w+) \| `(\w+)` \|", page, re.MULTILINE):
+            of.setdefault(group, set()).add(key)
+        self.assertIn("stiffness", of["material"])
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "integrate."),
                          {f"integrate.{key}=" for key in of["integrate"]})
         self.assertIn("scene.seed=", self.completed("polydem", "check", "a.nml", "--set", ""))

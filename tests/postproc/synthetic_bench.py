@@ -34,7 +34,7 @@ SIZES = (2522, 5058, 7599, 10014, 12651, 100000)
 
 #: Kind of scene -> entries of &scene by which the program makes such a scene, and of &boxes
 ENTRIES = {
-    "drum": ("name = 'drum' boxes = {boxes} motion = 'rotation' motion_rate = 0.25", "margin = 0.0"),
+    "drum": ("name = 'drum' boxes = {boxes}", "margin = 0.0"),
     "bed": ("name = 'bed' bodies = {boxes} width = 0.0", "margin = 0.0"),
     "column": ("name = 'bed' bodies = {boxes} width = 0.08", "margin = 0.0"),
     "hopper": ("name = 'hopper' bodies = {boxes} opening = 0.1 slope = 60", "margin = 0.0"),
@@ -63,6 +63,7 @@ def input_of(kind, boxes, number=0.3):
     entries += [f"{name}={value}" for name, value in axes.items()]
     groups = {
         "scene": entries,
+        **({"motion": ["name='turn'", "kind='rotation'", "rate=0.25"]} if kind == "drum" else {}),
         "boxes": [margin.replace(" ", "")],
         "forces": ["gravity=0.0, 0.0" if "'gas'" in scene else "gravity=0.0, -9.81"],
         "output": ["trace_start=0.9", f"folder='{kind}_{boxes}'"],

@@ -1,5 +1,6 @@
 """The Python interface of a trajectory, on a finished run of the program: a heap of 60 grains with contacts."""
 
+import copy
 import inspect
 import os
 import re
@@ -205,13 +206,12 @@ def test_forces_of_bodies_are_the_sums_over_contacts(run):
 
 def test_flags_say_which_walls_move(run, tmp_path):
     assert not run[0].driven.any() and (run[0].static == run[0].fixed).all()
-    motion = "motion = 'translation'\n   motion_velocity = 0.0, 0.01\n   motion_bodies = 61"
-    moved = make_run(tmp_path, motion)
+    motion = "/\n&motion name = '{}' kind = 'translation' velocity = 0.0, 0.01 bodies = {}"
+    moved = make_run(tmp_path, motion.format("a", 61))
     frame = Trajectory(moved)[-1]
     assert list(frame.id[frame.driven]) == [61]
     assert_array_equal(frame.static, frame.fixed & (frame.id != 61))
     assert frame.speed[frame.driven] == pytest.approx(0.01)
-    motion = "/\n&motion name = '{}' kind = 'translation' velocity = 0.0, 0.01 bodies = {}"
     two = make_run(tmp_path / "two", motion.format("a", 63) + motion.format("b", "61, 63"))
     frame = Trajectory(two)[-1]
     assert list(frame.id[frame.driven]) == [61, 63]
@@ -219,6 +219,15 @@ def test_flags_say_which_walls_move(run, tmp_path):
     every = make_run(tmp_path / "every", motion.format("a", 61).replace("bodies", "start = 9 bodies")
                      + "/\n&motion name = 'b' kind = 'translation' velocity = 0.0, 0.0")
     assert_array_equal(Trajectory(every)[-1].driven, Trajectory(every)[-1].fixed)
+
+
+def test_an_earlier_result_does_not_say_which_walls_move(run):
+    earlier = copy.copy(run)
+    earlier.settings = Settings("&scene\n   name = 'heap'\n   motion = 'none'\n/")
+    assert not earlier[0].driven.any()
+    earlier.settings = Settings("&scene\n   name = 'heap'\n   motion = 'translation'\n/")
+    with pytest.raises(ResultError, match="is of an earlier revision: `motion` in its &scene is a group &motion today"):
+        _ = earlier[0].driven
 
 
 #: Three grains, and walls of three, two and one bodies; a motion follows

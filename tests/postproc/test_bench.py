@@ -147,8 +147,8 @@ def test_a_scene_of_which_nothing_is_recorded_is_unknown(tmp_path, made_by):
 
 #: Changes of a recorded input that make another kind of it
 CHANGES = [
-    ("drum", "motion = 'rotation'", "motion = 'none'"),
-    ("drum", "motion_rate = 0.25", "motion_rate = 0.0"),
+    ("drum", "&motion\n   name = 'turn'\n   kind = 'rotation'\n   rate = 0.25\n/\n", ""),
+    ("drum", "rate = 0.25", "rate = 0.0"),
     ("drum", "margin = 0.0", "margin = 0.01"),
     ("drum", "name = 'drum'", "name = 'file'"),
     ("bed", "trace_start = 0.9", "trace_start = 0.0"),
@@ -169,8 +169,8 @@ def test_a_scene_that_is_made_otherwise_is_of_another_kind(kind, old, new):
 
 
 @pytest.mark.parametrize("kind, rate, expected", [("drum", 0.25, "drum"), ("drum", 0.0, OTHER), ("bed", 0.25, OTHER)])
-def test_walls_that_turn_by_a_group_make_a_drum_and_no_bed(kind, rate, expected):
-    text = input_of(kind, 1000).replace("motion = 'rotation'", "motion = 'none'").replace("   motion_rate = 0.25\n", "")
+def test_walls_of_which_one_turns_make_a_drum_and_no_bed(kind, rate, expected):
+    text = input_of(kind, 1000).replace("rate = 0.25", "rate = 0.0")
     groups = "".join(f"&motion\n   name = '{name}'\n   rate = {each}\n/\n" for name, each in (("a", rate), ("b", 0.0)))
     settings = settings_of(text + groups)
     assert settings["motion.a.rate"] == str(rate) and settings["motion.b.rate"] == "0.0"
@@ -180,7 +180,7 @@ def test_walls_that_turn_by_a_group_make_a_drum_and_no_bed(kind, rate, expected)
 def test_drums_of_another_rate_do_not_join_a_series(tmp_path):
     for boxes in (1000, 2000, 4000):
         write_sample(tmp_path, f"drum_{boxes}", "quadtree", TRUTH, boxes)
-    fast = input_of("drum", 8000).replace("motion_rate = 0.25", "motion_rate = 2.0")
+    fast = input_of("drum", 8000).replace("rate = 0.25", "rate = 2.0")
     write_sample(tmp_path, "drum_8000", "quadtree", TRUTH, 8000, made_by=fast)
     cases = series.over_size(read_bench([tmp_path]).on(), "quadtree")
     assert [case.boxes for case in cases] == [1000, 2000, 4000]
@@ -192,7 +192,7 @@ def test_benches_in_other_folders_have_the_same_scenes(tmp_path):
         write_sample(tmp_path / part, "drum_1000", "quadtree", TRUTH, 1000, made_by=made_by)
     (case,) = read_bench([tmp_path / "a", tmp_path / "b"]).cases
     assert len(case.samples) == 2
-    other = input_of("drum", 1000).replace("motion_rate = 0.25", "motion_rate = 2.0")
+    other = input_of("drum", 1000).replace("rate = 0.25", "rate = 2.0")
     write_sample(tmp_path / "c", "drum_1000", "quadtree", TRUTH, 1000, made_by=other)
     with pytest.raises(ResultError, match="that were made with different settings"):
         read_bench([tmp_path / "a", tmp_path / "c"])
@@ -200,7 +200,7 @@ def test_benches_in_other_folders_have_the_same_scenes(tmp_path):
 
 def test_finders_on_different_boxes_of_one_name_are_not_compared(tmp_path):
     write_sample(tmp_path / "a", "drum_1000", "quadtree", TRUTH, 1000)
-    other = input_of("drum", 1000).replace("motion_rate = 0.25", "motion_rate = 2.0")
+    other = input_of("drum", 1000).replace("rate = 0.25", "rate = 2.0")
     write_sample(tmp_path / "b", "drum_1000", "sort_and_sweep", TRUTH, 1000, made_by=other)
     bench = read_bench([tmp_path / "a", tmp_path / "b"])
     assert series.pairs_of(bench.select(finder="quadtree"), bench.select(finder="sort_and_sweep")) == []

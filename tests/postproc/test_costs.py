@@ -13,6 +13,8 @@ from polydem_post.read.trajectory import Trajectory
 #: Models of the studies here: each kind of entry, one with groups, and two that refine another one
 FEW = tuple(model for model in MODELS if model.name in (
     "nothing", "friction (Cundall-Strack)", "slip in mid-step", "two materials", "energy balance", "guard: energy"))
+#: A drum without a motion
+DRUM = "&scene name = 'drum' /\n"
 PLAIN = Sample("nothing", "time", 1, 1000, 400, 1, 100.0, 5.0, 0, "polydem 1", "a machine")
 
 class FakeStudy(Study):
@@ -53,7 +55,8 @@ def study(tmp_path, monkeypatch):
     FakeStudy.calls.clear()
     (tmp_path / "out").mkdir()
     (tmp_path / "inputs" / "bench").mkdir(parents=True)
-    (tmp_path / "inputs" / "bench" / "drum.nml").write_text("&scene name = 'drum' /\n", encoding="utf-8")
+    (tmp_path / "inputs" / "bench" / "drum.nml").write_text(
+        DRUM + "&motion\n   name = 'turn'\n/\n", encoding="utf-8")
     return FakeStudy(tmp_path / "none", tmp_path / "inputs", tmp_path / "out")
 
 
@@ -108,8 +111,8 @@ def test_models_run_in_turns_and_an_interrupted_study_goes_on(study):
 def test_a_model_with_groups_has_a_namelist_of_its_own(study):
     model = next(model for model in MODELS if model.groups)
     text = Path(study.scene(model)).read_text(encoding="utf-8")
-    assert text == "&scene name = 'drum' /\n" + model.groups
-    assert study.scene(FEW[0]) == "bench/drum.nml"
+    assert text == DRUM + model.groups
+    assert Path(study.scene(FEW[0])).read_text(encoding="utf-8") == DRUM
 
 
 def test_a_study_says_what_it_will_do_and_how_far_it_is(study, monkeypatch):

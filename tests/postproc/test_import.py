@@ -351,10 +351,10 @@ def test_arrays_become_bodies(tmp_path):
         write_bodies([np.array(SQUARE), FLOOR], tmp_path / "out.h5", fixed=[True], overwrite=True)
 
 
-def run_of(path, folder, *settings):
-    """A run from a bodies file: its trajectory."""
+def run_of(path, folder, *settings, groups=""):
+    """A run from a bodies file, with more groups: its trajectory."""
     (folder / "again.nml").write_text(f"&scene\n name = 'file'\n bodies_file = '{path}'\n/\n"
-                                      "&integrate\n duration = 1e-4\n/\n")
+                                      f"&integrate\n duration = 1e-4\n/\n{groups}")
     done = subprocess.run([PROGRAM, "run", "again.nml", "--force", *settings], cwd=folder, capture_output=True,
                           text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -397,8 +397,8 @@ def test_a_frame_keeps_masses_moving_walls_and_the_origin(tmp_path):
                  velocity=[[0.1, 0.2], [1 / 3, 0], [0, 0], [0, 0]], angular_velocity=[2 / 7, -1.0, 0, 0],
                  density=[1000.0, 1234.5, np.inf, np.inf], mass=[0.0, 0.77, np.inf, 3.0],
                  inertia=[0.0, 1.1e-5, np.inf, np.inf], id=[9, 4, 2, 7], origin=(100.0, 50.0), scale=1.0)
-    moved = ("--set=scene.motion=translation", "--set=scene.motion_bodies=2", "--set=scene.motion_velocity=0.3,0")
-    first = run_of(tmp_path / "one.h5", tmp_path, *moved)
+    moved = "&motion name = 'push' kind = 'translation' bodies = 2 velocity = 0.3, 0 /\n"
+    first = run_of(tmp_path / "one.h5", tmp_path, groups=moved)
     frame = first[-1]
     assert_array_equal(frame.id, [2, 4, 7, 9])
     assert_array_equal(frame.mass[:3], [np.inf, 0.77, 3.0])

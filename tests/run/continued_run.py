@@ -13,10 +13,8 @@ SCENE = """\
    overlap = .true.
    speed = 0.5
    spin = 20
-   motion = 'oscillation'
-   motion_amplitude = 1e-3, 2e-3
-   motion_frequency = 300
 /
+&motion name = 'shake' kind = 'oscillation' amplitude = 1e-3, 2e-3 frequency = 300 /
 &forces stiffness = 1e6 /
 &integrate dt = 1e-5 duration = 1.2e-2 /
 &output frame_interval = 1.2e-4 frames_per_segment = 10 log_interval = 1e-3 contacts = .true. /

@@ -18,7 +18,7 @@ OTHERS = {
     "hopper_descending": "&scene name='hopper' bodies=100 opening=0.05 slope=37 width=0.21 speed=0.2 seed=0 "
                          "order='descending' corners_min=3 corners_max=20 density=1000 /",
     "incline_moving": "&scene name='incline' width=0.02 height=0.01 slope=31 speed=0.3 density=3000 /",
-    "drum_turning": "&scene name='drum' boxes=300 radius=0.2 motion='rotation' motion_rate=2 speed=0.1 /",
+    "drum_turning": "&scene name='drum' boxes=300 radius=0.2 speed=0.1 / &motion name='turn' kind='rotation' rate=2 /",
     "bed_packed": "&scene name='bed' bodies=700 packing='packing' /",
     "bed_lifted": "&scene name='bed' bodies=50 / &motion name='up' kind='translation' velocity=0, 0.1 bodies=51, 53 /",
 }

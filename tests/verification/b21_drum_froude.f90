@@ -58,9 +58,9 @@ contains
 
       stretch = 1.0_wp/sqrt(share)
       call read_settings_text('drum.nml', '&scene name = ''drum'' bodies = 250 seed = '//to_text(seed)// &
-                              ' motion = ''rotation'' motion_rate = '//to_text(0.5_wp/stretch, 17)// &
-                              ' motion_start = '//to_text(0.3_wp*stretch, 17)// &
-                              ' motion_ramp = '//to_text(0.1_wp*stretch, 17)// &
+                              ' / &motion name = ''turn'' kind = ''rotation'' rate = '//to_text(0.5_wp/stretch, 17)// &
+                              ' start = '//to_text(0.3_wp*stretch, 17)// &
+                              ' ramp = '//to_text(0.1_wp*stretch, 17)// &
                               ' / &forces gravity = 0, '//to_text(-share*gravity, 17)// &
                               ' friction_coefficient = 0.4 damping_coefficient = 0.5 stiffness = 1e8'//area_law// &
                               ' / &integrate duration = '//to_text(3.0_wp*stretch, 17)// &

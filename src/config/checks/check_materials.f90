@@ -2,15 +2,16 @@
 module polydem_check_materials
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
+   use polydem_kinds, only: wp
+   use polydem_pair_entries, only: n_pair_entries, pair_entries
    use polydem_settings, only: settings_t
    implicit none
    private
    public :: check_materials
 
-   !> Parameters of contacts that a material may give
-   character(len=*), parameter :: parameters(7) = [character(len=20) :: 'stiffness', 'restitution', &
-      'damping_coefficient', 'friction_coefficient', 'tangential_stiffness', 'cohesion', &
-      'rolling_friction']
+   !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
+   !> restitution, and so is a time step that resolves the impact
+   real(wp), parameter :: least_restitution = 0.01_wp
 
 contains
 
@@ -25,8 +26,12 @@ contains
       integer :: k
 
       do k = 1, size(instances)
-         if (instances(k)%group == 'material' .or. instances(k)%group == 'contact_pair') &
+         if (instances(k)%group == 'material' .or. instances(k)%group == 'contact_pair') then
             call check_use(instances(k), instances(index_of_instance(instances, 'forces')), error)
+            call check_restitution(instances(k), error)
+         else if (instances(k)%group == 'forces') then
+            call check_restitution(instances(k), error)
+         end if
       end do
       do k = 1, size(settings%contact_pair)
          call check_pair(settings, k, instances(index_of_instance(instances, 'contact_pair', &
@@ -43,17 +48,31 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      do k = 1, size(parameters)
+      do k = 1, n_pair_entries
          ! The stiffness is in use, whether &forces gives it or its ratio to the pressure.
-         if (parameters(k) == 'stiffness') cycle
-         associate (value => group%values(row_of(group, trim(parameters(k)))))
-            if (.not. value%is_given .or. forces%values(row_of(forces, trim(parameters(k))))%is_active) cycle
+         if (pair_entries(k) == 'stiffness') cycle
+         associate (value => group%values(row_of(group, trim(pair_entries(k)))))
+            if (.not. value%is_given .or. forces%values(row_of(forces, trim(pair_entries(k))))%is_active) cycle
             if (any(forces%values%is_override) .and. .not. value%is_override) cycle
-            call raise(error, input_error, value%place//': '''//trim(parameters(k))//''' in &'//trim(group%group)// &
-               ' '//group%name//' is not used, because '//reason(trim(parameters(k)), forces))
+            call raise(error, input_error, value%place//': '''//trim(pair_entries(k))//''' in &'//trim(group%group)// &
+               ' '//group%name//' is not used, because '//reason(trim(pair_entries(k)), forces))
          end associate
       end do
    end subroutine check_use
+
+   !> Refuse a restitution that is given and too small.
+   pure subroutine check_restitution(group, error)
+      !> Group &forces, &material or &contact_pair
+      type(instance_t), intent(in) :: group
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (value => group%values(row_of(group, 'restitution')))
+         if (.not. (value%is_given .and. value%is_active)) return
+         if (value%reals(1) < least_restitution) call raise(error, input_error, value%place// &
+            ': ''restitution'' in &'//trim(group%group)//' must be at least 0.01, because a smaller value needs a '// &
+            'very small time step; give ''damping_coefficient'' instead')
+      end associate
+   end subroutine check_restitution
 
    !> Why the force law does not use a parameter
    pure function reason(parameter_name, forces) result(text)
@@ -87,8 +106,8 @@ contains
 
       place = group%values(row_of(group, 'materials'))%place//': ''materials'' in &contact_pair '//group%name
       is_given = .false.
-      do j = 1, size(parameters)
-         is_given = is_given .or. group%values(row_of(group, trim(parameters(j))))%is_given
+      do j = 1, n_pair_entries
+         is_given = is_given .or. group%values(row_of(group, trim(pair_entries(j))))%is_given
       end do
       if (.not. is_given) call raise(error, input_error, place//': the pair gives no parameter; give one, for '// &
          'example friction_coefficient = 0.2, or leave out the group')

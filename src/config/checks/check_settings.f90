@@ -29,9 +29,6 @@ module polydem_check_settings
       'turn with it; use translation or oscillation'
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
-   !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
-   !> restitution, and so is a time step that resolves the impact
-   real(wp), parameter :: least_restitution = 0.01_wp
 
    !> Scenes in which `width` is the width of the container; in other scenes it is the width of a block
    character(len=*), parameter :: grain_scenes(4) = [character(len=6) :: 'hopper', 'gas', 'bed', 'heap']
@@ -53,12 +50,6 @@ contains
       call check_motions(settings, instances, error)
       call check_cell(settings, instances, error)
       associate (group => instances(index_of_instance(instances, 'forces')))
-         associate (given => group%values(row_of(group, 'restitution')))
-            if (given%is_active .and. settings%forces%restitution < least_restitution) then
-               call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
-                  'because a smaller value needs a very small time step; give ''damping_coefficient'' instead')
-            end if
-         end associate
          call check_gravity(settings, group, error)
          call check_pressure(settings, group, error)
       end associate
@@ -172,22 +163,13 @@ contains
       end associate
    end subroutine check_scene
 
-   !> Check the speeds of oscillations and the ends of motions, and that motions are given either in &scene or in
-   !> groups &motion.
+   !> Check the speeds of oscillations and the ends of motions.
    pure subroutine check_motions(settings, instances, error)
       type(settings_t), intent(in) :: settings
       type(instance_t), intent(in) :: instances(:)
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      associate (scene => settings%scene, group => instances(index_of_instance(instances, 'scene')))
-         if (scene%motion == 'oscillation') call require( &
-            two_pi*scene%motion_frequency*maxval(abs(scene%motion_amplitude)) < speed_limit, &
-            too_fast, 'motion_amplitude', 'motion_frequency', group, error)
-         if (scene%motion /= 'none' .and. size(settings%motion) > 0) call raise(error, input_error, &
-            group%values(row_of(group, 'motion'))%place//': ''motion'' in &scene cannot be combined with groups '// &
-            '&motion; write it as one of them')
-      end associate
       do k = 1, size(settings%motion)
          associate (motion => settings%motion(k))
             if (motion%kind == 'oscillation') call require( &
@@ -218,7 +200,6 @@ contains
          if (all(settings%scene%name /= [character(len=6) :: 'parts', 'file', 'result'])) call blame(scene, 'name', &
             'must be left out in a periodic cell, since recipes have walls around the grains; start from the '// &
             'groups &grains and &wall that check --expand prints, without these walls', error)
-         if (settings%scene%motion == 'rotation') call blame(scene, 'motion', no_rotation, error)
       end associate
       do k = 1, size(settings%motion)
          if (settings%motion(k)%kind == 'rotation') call blame( &

@@ -10,8 +10,9 @@ module polydem_area_law
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t
    use polydem_elementary, only: hypotenuse
-   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
+   use polydem_force_part, only: force_part_t, resting_block_t, softness_fit_t, stage_elastic
    use polydem_kinds, only: ip, wp
+   use polydem_pair_entries, only: at_stiffness
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -45,6 +46,8 @@ contains
       associate (unused => settings)
       end associate
       self%stage = stage_elastic
+      self%logged = [at_stiffness]
+      self%fit = softness_fit_t(tipping=[5.45_wp, 1.0_wp/3.0_wp], impact=[2.7_wp, 0.45_wp])
       self%stiffness = pairs%stiffness
       self%undamped_warning = 'the area law is not conservative: without damping it adds kinetic energy at '// &
          'any time step (a third in 0.2 s in a gas); set law = ''polar'' in &forces, or use damping'

@@ -34,6 +34,7 @@ module polydem_cohesion
    use polydem_force_part, only: force_part_t, stage_normal
    use polydem_kinds, only: ip, wp
    use polydem_linearised_contact, only: linearised_contact_t
+   use polydem_pair_entries, only: at_cohesion
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -68,6 +69,7 @@ contains
       self%stage = stage_normal
       self%needs_cohesion = .true.
       self%cohesion_has_energy = .true.
+      self%logged = [at_cohesion]
       self%strength = pairs%cohesion
    end subroutine configure
 

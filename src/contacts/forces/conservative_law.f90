@@ -37,9 +37,10 @@ module polydem_conservative_law
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_linearised_contact, only: linearised_contact_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
-   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
+   use polydem_force_part, only: force_part_t, resting_block_t, softness_fit_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_overlap_measure, only: overlap_measure_t
+   use polydem_pair_entries, only: at_stiffness
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -74,8 +75,14 @@ contains
       associate (unused => settings)
       end associate
       self%stage = stage_elastic
-      if (self%overlap_measure%per_length) self%steepening = 4.5_wp
+      if (self%overlap_measure%per_length) then
+         self%steepening = 4.5_wp
+         self%fit = softness_fit_t(tipping=[9.7_wp, 1.0_wp], impact=[3.35_wp, 0.5_wp])
+      else
+         self%fit = softness_fit_t(tipping=[4.7_wp, 0.25_wp], impact=[4.2_wp, 0.3_wp])
+      end if
       self%energy_is_known = .true.
+      self%logged = [at_stiffness]
       self%stiffness = pairs%stiffness
    end subroutine configure
 

@@ -17,6 +17,7 @@ module polydem_cundall_strack
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
+   use polydem_pair_entries, only: at_friction_coefficient
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -52,6 +53,7 @@ contains
       type(pair_parameters_t), intent(in) :: pairs
 
       self%stage = stage_last
+      self%logged = [at_friction_coefficient]
       self%coefficient = pairs%friction_coefficient
       self%full_coefficient = self%coefficient%one
       self%stiffness = pairs%tangential_stiffness

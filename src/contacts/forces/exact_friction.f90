@@ -36,6 +36,7 @@ module polydem_exact_friction
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within
    use polydem_kinds, only: ip, lp, wp
+   use polydem_pair_entries, only: at_friction_coefficient
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_source_locations, only: place_of
@@ -81,6 +82,7 @@ contains
       type(forces_settings_t), intent(in) :: settings
       type(pair_parameters_t), intent(in) :: pairs
 
+      self%logged = [at_friction_coefficient]
       self%coefficient = pairs%friction_coefficient
       self%full_coefficient = self%coefficient%one
       self%tolerance = settings%friction_tolerance

@@ -8,9 +8,10 @@ module polydem_force_law
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_errors, only: error_t
-   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic, stage_on_damping
+   use polydem_force_part, only: force_part_t, resting_block_t, softness_fit_t, stage_elastic, stage_on_damping
    use polydem_kinds, only: ip, wp
    use polydem_overlap_measure, only: overlap_measure_t
+   use polydem_pair_entries, only: n_pair_entries
    use polydem_pair_parameters, only: pair_parameters_t, uniform_parameters
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_velocity_constraint, only: velocity_constraint_t
@@ -33,6 +34,8 @@ module polydem_force_law
       class(velocity_constraint_t), allocatable :: constraint
       !> First columns of the contact history, in this order; not allocated before `choose_parts`
       type(history_kind_t), allocatable :: history_kinds(:)
+      !> How far the law is from rigid
+      type(softness_fit_t) :: fit
       !> How the law measures overlaps
       type(overlap_measure_t) :: overlap_measure
       !> Whether a part adds to the column `cohesion`
@@ -47,6 +50,8 @@ module polydem_force_law
       logical :: energy_is_known = .false.
       !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
+      !> Parameters that the log has for each pair of materials, by their places in `pair_entries`
+      logical :: logged(n_pair_entries) = .false.
    contains
       procedure, private :: add_part
       procedure, private :: add_constraint
@@ -119,6 +124,7 @@ contains
          associate (part => law%parts(k)%part)
             if (part%stage == stage_elastic) then
                law%overlap_measure = part%overlap_measure
+               law%fit = part%fit
                law%needs_shares = law%needs_shares .or. part%overlap_measure%per_length
             end if
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
@@ -128,6 +134,7 @@ contains
             law%energy_is_known = law%energy_is_known .or. part%energy_is_known
             part%first_column = size(law%history_kinds) + 1
             if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
+            if (allocated(part%logged)) law%logged(part%logged) = .true.
             if (k > 1 .and. part%stage /= stage_on_damping) law%description = law%description//','
             law%description = law%description//' '//trim(part%name)
          end associate
@@ -136,6 +143,7 @@ contains
          associate (part => law%constraint)
             part%first_column = size(law%history_kinds) + 1
             if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
+            if (allocated(part%logged)) law%logged(part%logged) = .true.
             law%description = law%description//', '//trim(part%name)
          end associate
       end if

@@ -21,7 +21,8 @@ module polydem_force_part
    use polydem_overlap_measure, only: overlap_measure_t
    implicit none
    private
-   public :: force_part_t, resting_block_t, stage_elastic, stage_damping, stage_on_damping, stage_normal, stage_last
+   public :: force_part_t, resting_block_t, softness_fit_t, stage_elastic, stage_damping, stage_on_damping, &
+             stage_normal, stage_last
 
    !> Stages in the order in which they act: elastic repulsion, which sets `inverse_length` and `lever`; normal damping,
    !> which uses the repulsion only; changes of the damping; other forces, such as cohesion; friction and damping of
@@ -42,12 +43,23 @@ module polydem_force_part
       integer(ip) :: materials(2) = 0_ip
    end type resting_block_t
 
+   !> Errors beside rigid bodies, as fits: coefficient and exponent of the softness, a pressure over the stiffness;
+   !> 0: not known
+   type :: softness_fit_t
+      !> Error of the tangent of the slope on which a block of 1 x 4 topples, over the static pressure, (2)
+      real(wp) :: tipping(2) = 0.0_wp
+      !> Error of the velocity after an elastic impact on a corner, over the speed of the impact; over its pressure, (2)
+      real(wp) :: impact(2) = 0.0_wp
+   end type softness_fit_t
+
    !> One part of the force between two bodies in contact. The factory or `configure` sets all components
    type, abstract, extends(law_part_t) :: force_part_t
       !> Stage in which it acts, one of the constants above
       integer :: stage = stage_normal
       !> How overlaps must be measured; that of the elastic part counts
       type(overlap_measure_t) :: overlap_measure
+      !> How far it is from rigid; that of the elastic part counts
+      type(softness_fit_t) :: fit
       !> Whether it adds to the column `cohesion`, and whether it states the energy there
       logical :: needs_cohesion = .false., cohesion_has_energy = .false.
       !> Whether it adds to the column `twist`

@@ -20,6 +20,8 @@ module polydem_law_part
    type, abstract :: law_part_t
       !> Name for `polydem check` and the log
       character(len=40) :: name = ''
+      !> Places in `pair_entries` of the parameters that the log has for each pair of materials; not allocated: none
+      integer, allocatable :: logged(:)
       !> Index of the first column of this member in `contact_history_t`; the law sets it
       integer :: first_column = 1
       !> Its contact history: column(first_column), column(first_column + 1) ... of `contact_history_t`; not allocated

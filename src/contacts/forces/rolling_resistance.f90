@@ -21,6 +21,7 @@ module polydem_rolling_resistance
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
    use polydem_linearised_contact, only: linearised_contact_t
+   use polydem_pair_entries, only: at_rolling_friction
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
@@ -65,6 +66,7 @@ contains
       self%stage = stage_last
       self%needs_twist = .true.
       self%needs_accelerations = .true.
+      self%logged = [at_rolling_friction]
       self%coefficient = pairs%rolling_friction
       self%full_coefficient = self%coefficient%one
       self%stiffness = self%coefficient

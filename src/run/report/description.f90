@@ -4,7 +4,11 @@ module polydem_description
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
+   use polydem_namelist_entries, only: entries, first_row
    use polydem_overlap_table, only: write_overlap_table
+   use polydem_pair_entries, only: n_pair_entries, pair_entries
+   use polydem_pair_value, only: pair_value_t
+   use polydem_pair_values, only: parameter_at
    use polydem_result_files, only: overlaps_name
    use polydem_run_duration, only: longest_run
    use polydem_rigidity, only: describe_rigidity
@@ -235,20 +239,17 @@ contains
       integer(ip), intent(in) :: materials(2)
       character(len=:), allocatable :: text
 
-      associate (pairs => simulation%law%pairs, parts => simulation%law%description)
-         text = 'stiffness '//to_text(pairs%stiffness%of(materials), 3)//' N/m2'
-         if (index(parts, 'restitution') > 0) then
-            text = text//', restitution '//to_text(pairs%restitution%of(materials), 3)
-         else if (index(parts, 'damping') > 0) then
-            text = text//', damping '//to_text(pairs%damping_coefficient%of(materials), 3)
-         end if
-         if (index(parts, 'friction') > 0) text = text//', friction '// &
-            to_text(pairs%friction_coefficient%of(materials), 3)
-         if (index(parts, 'cohesion') > 0) text = text//', cohesion '//to_text(pairs%cohesion%of(materials), 3)// &
-            ' N/m2'
-         if (index(parts, 'rolling') > 0) text = text//', rolling friction '// &
-            to_text(pairs%rolling_friction%of(materials), 3)
-      end associate
+      type(pair_value_t) :: value
+      integer :: k
+
+      text = ''
+      do k = 1, n_pair_entries
+         if (.not. simulation%law%logged(k)) cycle
+         value = parameter_at(simulation%law%pairs, k)
+         if (text /= '') text = text//', '
+         text = text//trim(pair_entries(k))//' '//to_text(value%of(materials), 3)// &
+            trim(' '//entries(first_row('forces', trim(pair_entries(k))))%unit)
+      end do
    end function pair_text
 
    !> Duration and number of steps, and the requested duration if it is another one

@@ -60,13 +60,8 @@ contains
 
       do k = 1, size(settings%motion)
          associate (motion => settings%motion(k))
-            if (motion%name == '') then
-               call begin('scene', '', 'motion_start', motion%start)
-               call grow('scene', '', 'motion_ramp', motion%ramp, '', motion%start, motion%end)
-            else
-               call begin('motion', motion%name, 'start', motion%start)
-               call grow('motion', motion%name, 'ramp', motion%ramp, motion%stage, motion%start, motion%end)
-            end if
+            call begin('motion', motion%name, 'start', motion%start)
+            call grow('motion', motion%name, 'ramp', motion%ramp, motion%stage, motion%start, motion%end)
          end associate
       end do
       do k = 1, size(settings%load)
@@ -205,8 +200,7 @@ contains
             call weigh('load.'//s%load(k)%name, key, '&load '//s%load(k)%name, load_pressure(simulation, s%load(k), k))
          end do
          if (s%cell%obeys /= 'none') call weigh('cell', 'stress', '&cell', maxval(abs(s%cell%stress)))
-         if (index(law%description, 'cohesion') > 0) call weigh('forces', 'cohesion', '&forces or &material', &
-                                                                  law%pairs%cohesion%greatest())
+         call weigh('forces', 'cohesion', '&forces or &material', law%pairs%cohesion%greatest())
       end associate
 
    contains

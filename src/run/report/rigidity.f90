@@ -5,6 +5,7 @@
 !> where P is density times speed squared. `test_rigidity` measures them.
 module polydem_rigidity
    use polydem_elementary, only: exponential, logarithm
+   use polydem_force_part, only: softness_fit_t
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
    use polydem_scene_measures, only: scene_measures_t
@@ -13,23 +14,6 @@ module polydem_rigidity
    implicit none
    private
    public :: describe_rigidity, tipping_error, impact_error, share_text
-
-   !> Coefficient and exponent of the errors of a law
-   type :: fit_t
-      !> Name of the law, with which the description of the parts begins
-      character(len=16) :: name
-      !> Coefficient and exponent of tipping, (2)
-      real(wp) :: tipping(2)
-      !> Those of an impact on a corner, (2)
-      real(wp) :: impact(2)
-   end type fit_t
-
-   real(wp), parameter :: third = 1.0_wp/3.0_wp
-   !> Fits of all laws
-   type(fit_t), parameter :: fits(3) = [ &
-      fit_t('polar law', [9.7_wp, 1.0_wp], [3.35_wp, 0.5_wp]), &
-      fit_t('conservative law', [4.7_wp, 0.25_wp], [4.2_wp, 0.3_wp]), &
-      fit_t('area law', [5.45_wp, third], [2.7_wp, 0.45_wp])]
 
 contains
 
@@ -42,54 +26,39 @@ contains
       character(len=:), allocatable :: text
 
       if (measures%free == 0_ip) return
-      associate (s => simulation, parts => simulation%law%description)
+      associate (s => simulation, fit => simulation%law%fit)
          text = 'stiffness  E = '//to_text(measures%stiffness, 3)//' N/m2'
          if (measures%softness > 0.0_wp) text = text//', '//to_text(1.0_wp/measures%softness, 2)// &
             ' times the static pressure '//to_text(s%pressure%greatest, 2)//' N/m2 '//s%pressure%origin// &
             ': faces '//to_text(measures%softness, 2)//' of a grain deep, error of tipping '// &
-            share_text(tipping_error(parts, measures%softness))
+            share_text(tipping_error(fit, measures%softness))
          call log%write_line(text)
          if (measures%impact_softness > 0.0_wp) call log%write_line('           '// &
             to_text(1.0_wp/measures%impact_softness, 2)//' times the pressure of impacts at '// &
             to_text(s%expected%speed, 3)//' m/s: error of an elastic impact on a corner '// &
-            share_text(impact_error(parts, measures%impact_softness)))
+            share_text(impact_error(fit, measures%impact_softness)))
       end associate
    end subroutine describe_rigidity
 
    !> Error of the tangent of the slope on which a block of 1 x 4 topples
-   pure real(wp) function tipping_error(parts, softness)
-      !> Description of the force law
-      character(len=*), intent(in) :: parts
+   pure real(wp) function tipping_error(fit, softness)
+      !> Fits of the force law
+      type(softness_fit_t), intent(in) :: fit
       !> Static pressure over stiffness
       real(wp), intent(in) :: softness
-      type(fit_t) :: fit
 
-      fit = fit_of(parts)
       tipping_error = fitted(fit%tipping, softness)
    end function tipping_error
 
    !> Error of the velocity after an impact on a corner, over the speed of the impact
-   pure real(wp) function impact_error(parts, softness)
-      !> Description of the force law
-      character(len=*), intent(in) :: parts
+   pure real(wp) function impact_error(fit, softness)
+      !> Fits of the force law
+      type(softness_fit_t), intent(in) :: fit
       !> Pressure of the impact over stiffness
       real(wp), intent(in) :: softness
-      type(fit_t) :: fit
 
-      fit = fit_of(parts)
       impact_error = fitted(fit%impact, softness)
    end function impact_error
-
-   !> Fits of the law with which a description of the parts begins; 0 of another law
-   pure type(fit_t) function fit_of(parts)
-      character(len=*), intent(in) :: parts
-      integer :: k
-
-      fit_of = fit_t('', 0.0_wp, 0.0_wp)
-      do k = 1, size(fits)
-         if (index(parts, trim(fits(k)%name)) == 1) fit_of = fits(k)
-      end do
-   end function fit_of
 
    !> A coefficient times a power with a real exponent
    pure real(wp) function fitted(fit, softness)

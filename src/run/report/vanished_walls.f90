@@ -28,8 +28,7 @@ contains
       end do
       do k = 1, size(settings%motion)
          associate (motion => settings%motion(k))
-            if (motion%stage /= '' .or. motion%name == '') cycle
-            call begin(settings, 'motion', motion%name, motion%wall, motion%start, warnings)
+            if (motion%stage == '') call begin(settings, 'motion', motion%name, motion%wall, motion%start, warnings)
          end associate
       end do
       do k = 1, size(settings%stage)

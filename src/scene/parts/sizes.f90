@@ -10,7 +10,7 @@
 module polydem_sizes
    use polydem_elementary, only: exponential, logarithm
    use polydem_kinds, only: ip, wp
-   use polydem_settings, only: grains_settings_t
+   use polydem_settings, only: shape_settings_t
    implicit none
    private
    public :: draw_sizes, sizes_of, size_at, sizes_differ
@@ -23,7 +23,7 @@ contains
    !> Whether the grains of a group differ in size by more than their lengths say
    pure logical function sizes_differ(group)
       !> The group
-      type(grains_settings_t), intent(in) :: group
+      class(shape_settings_t), intent(in) :: group
 
       sizes_differ = group%size_ratio > 1.0_wp .or. group%sizes == 'log_normal' .or. group%sizes == 'grading'
    end function sizes_differ
@@ -31,7 +31,7 @@ contains
    !> Size factors of n grains in descending order, without randomness
    pure function sizes_of(group, n) result(sizes)
       !> Distribution
-      type(grains_settings_t), intent(in) :: group
+      class(shape_settings_t), intent(in) :: group
       !> Number of grains
       integer(ip), intent(in) :: n
       real(wp) :: sizes(n)
@@ -72,7 +72,7 @@ contains
    !> Size factor below which a share of the grains is
    pure real(wp) function size_at(group, share)
       !> Distribution
-      type(grains_settings_t), intent(in) :: group
+      class(shape_settings_t), intent(in) :: group
       !> Share by number, from 0 to 1
       real(wp), intent(in) :: share
 

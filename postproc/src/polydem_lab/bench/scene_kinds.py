@@ -75,7 +75,7 @@ def kind_of(settings: dict) -> str:
     if settings.get("scene.order", "natural") != "natural":
         return OTHER
     if name == "drum":
-        return "drum" if any(rate != 0.0 for rate in _rates_of_walls(settings)) else OTHER
+        return "drum" if any(rate != 0.0 for rate in rates_of_walls(settings)) else OTHER
     if name == "bed":
         return _kind_of_bed(settings)
     return OTHER
@@ -91,11 +91,9 @@ def making_of(settings: dict) -> tuple:
     return tuple(sorted((entry, value) for entry, value in settings.items() if not REST_OF_ENTRIES.fullmatch(entry)))
 
 
-def _rates_of_walls(settings: dict) -> list[float]:
+def rates_of_walls(settings: dict) -> list[float]:
     """The rates of all rotations of walls."""
-    entries = ["scene.motion_rate"] if settings.get("scene.motion") == "rotation" else []
-    entries += [entry for entry in settings if re.fullmatch(r"motion\.\w+\.rate", entry)]
-    return [number_in(settings, entry) for entry in entries]
+    return [number_in(settings, entry) for entry in settings if re.fullmatch(r"motion\.\w+\.rate", entry)]
 
 
 def _kind_of_gas(settings: dict) -> str:
@@ -123,7 +121,7 @@ def float_or_one(word: str) -> float:
 
 
 def _kind_of_bed(settings: dict) -> str:
-    moves = settings.get("scene.motion", "none") != "none" or any(entry.startswith("motion.") for entry in settings)
+    moves = any(entry.startswith("motion.") for entry in settings)
     if number_in(settings, "scene.size_ratio", 1.0) > 1.0 or moves:
         return OTHER
     if number_in(settings, "output.trace_start") < SETTLED:

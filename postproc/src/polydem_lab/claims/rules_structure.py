@@ -6,6 +6,7 @@ import numpy as np
 
 from ..bench import paper, series
 from ..bench.samples import Bench
+from ..bench.scene_kinds import rates_of_walls
 from ..bench.series import SWEEP, TREE
 from ..bench.statistics import NOTHING, every, number
 from ..costs import complexity
@@ -65,7 +66,7 @@ def _gains(bench: Bench, finder: str) -> dict:
         most = 2 if finder == SWEEP else case.threads
         one = bench.select(scene=case.scene, mode="replay", threads=1,
                            finder=SWEEP if finder in (PARTITIONED, *OBVIOUS) else finder)
-        usual = series.parameter(case, "scene.motion_rate") == paper.RATE
+        usual = rates_of_walls(case.settings) == [paper.RATE]
         if one and usual and 1 < case.threads <= min(most, int(case.provenance.get("processors", case.threads))):
             gain = NOTHING if case.is_disturbed else series.ratio(one[0], case, series.elapsed_time)
             found[case.boxes] = max(found.get(case.boxes, (0, gain)), (case.threads, gain), key=lambda each: each[0])

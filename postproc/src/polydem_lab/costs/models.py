@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from polydem_post.base.emit import FORMATS, SUFFIXES, Table
-from polydem_post.base.result_file import ResultError
+from polydem_post.base.result_file import ResultError, cannot_read
 from polydem_post.read.trajectory import Trajectory
 
 from ..bench.records import read_records, write_records
@@ -43,11 +43,13 @@ WEIGHINGS = 3
 #: Silence after which a study says how far it is [s]
 SILENCE = 10.0
 
-#: Every optional model off
+#: The group of the drum that turns its walls
+MOTION = re.compile(r"^&motion\n.*?^/\n", re.MULTILINE | re.DOTALL)
+
+#: Every other optional model off
 BARE = (
     "forces.damping=none",
     "forces.friction=none",
-    "scene.motion=none",
     "guards.displacement=off",
     "guards.step=off",
     "guards.overlap=off",
@@ -100,7 +102,7 @@ MODELS = (
     Model("stop without direction", ("overlap.degenerate=stop",)),
     Model("compensated sums", ("integrate.accumulation=compensated",)),
     Model("Gear's integrator", ("integrate.scheme=gear",)),
-    Model("turning walls", ("scene.motion=rotation", "scene.motion_rate=0.25")),
+    Model("turning walls", (), groups="&motion name = 'turn' kind = 'rotation' rate = 0.25 /\n"),
     Model("guard: displacement", ("guards.displacement=stop",)),
     Model("guard: stable step", ("guards.step=stop",)),
     Model("guard: overlap", ("guards.overlap=warn",)),
@@ -152,12 +154,14 @@ class Study:
         return command + [part for word in words for part in ("--set", word)]
 
     def scene(self, model: Model) -> str:
-        """Name of the namelist of a model, relative to the inputs; one with more groups is written first."""
-        name = "bench/drum.nml"
-        if not model.groups:
-            return name
-        path = self.output.resolve() / "drum_with_groups.nml"
-        path.write_text((self.inputs / name).read_text(encoding="utf-8") + model.groups, encoding="utf-8")
+        """The namelist of a model, which is written first: the drum at rest, with the groups of the model."""
+        bench = self.inputs / "bench" / "drum.nml"
+        try:
+            drum = bench.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise cannot_read(bench, error) from error
+        path = self.output.resolve() / "drum.nml"
+        path.write_text(MOTION.sub("", drum) + model.groups, encoding="utf-8")
         return str(path)
 
     def run(self, namelist: str, folder: Path, overrides, **environment: str) -> Trajectory:

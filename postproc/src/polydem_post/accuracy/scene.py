@@ -23,8 +23,7 @@ LEAST_ROWS = 4
 STEP = re.compile(r"^step +dt = (\S+) s, \S+ of the stable time step (\S+) s", re.MULTILINE)
 
 #: Entries of &scene that have a meaning when bodies come from a file
-KEPT = ("seed", "density", "material", "wall_material", "motion", "motion_bodies", "motion_pivot", "motion_rate",
-        "motion_velocity", "motion_amplitude", "motion_frequency", "motion_start", "motion_ramp")
+KEPT = ("seed", "density", "material", "wall_material")
 
 
 #: What `check` says of the deepest contact at the start

@@ -179,7 +179,7 @@ class Frame:
 
     @cached_property
     def driven(self) -> npt.NDArray[np.bool_]:
-        """Whether each body is fixed and has a prescribed motion (scene.motion of the stored namelist) [1], (n)."""
+        """Whether each body is fixed and has a prescribed motion (&motion of the stored namelist) [1], (n)."""
         return self._given_source("prescribed motions").driven_of(self)
 
     @property
@@ -360,7 +360,7 @@ class Frame:
         fixed bodies, velocities, angular velocities, masses, moments of inertia and materials, all to the last bit;
         the centres of mass of the run follow from the vertices, within rounding. Angles and time begin at 0, and
         friction begins without history: to continue a run to the same bits, use its checkpoints. Fixed bodies have no
-        velocity in the file: give `motion` in the namelist. `bodies_file.write_bodies` writes other outlines and
+        velocity in the file: give a `&motion` in the namelist. `bodies_file.write_bodies` writes other outlines and
         columns.
         """
         return write_frame(self, path, self._source.origin_for(self) if self._source else (0.0, 0.0), overwrite)

@@ -429,14 +429,14 @@ class Trajectory:
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         """Which bodies the stored namelist moves, (n): all fixed ones, or those that a motion lists."""
-        scene = self.settings.scene
+        if self.settings.get("scene", {}).get("motion", "none") != "none":
+            raise ResultError(f"{self.folder}: is of an earlier revision: `motion` in its &scene is a group &motion "
+                              "today, so which walls move cannot be read; run the scene again")
         bodies = {"id": frame.id, "fixed": frame.fixed, **self._bodies[1]}
         walls = wall_bodies(self.settings, bodies["id"][bodies["fixed"]])
         chosen = [walls[motion["wall"]] if motion.get("wall") else motion.get("bodies")
                   for motion in self.settings.get("motion", {}).values()]
         chosen += [walls[load["wall"]] for load in self.settings.get("load", {}).values()]
-        if scene.get("motion", "none") != "none":
-            chosen.append(scene.get("motion_bodies"))
         if any(ids is None for ids in chosen):
             return frame.fixed
         return frame.fixed & np.isin(frame.id, np.concatenate([np.atleast_1d(ids) for ids in [[], *chosen]]))

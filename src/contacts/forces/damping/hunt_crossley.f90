@@ -9,6 +9,7 @@ module polydem_hunt_crossley
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: find_reaches, normal_damping_t
+   use polydem_pair_entries, only: at_damping_coefficient
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: weighted
    use polydem_settings, only: forces_settings_t
@@ -35,6 +36,7 @@ contains
       type(pair_parameters_t), intent(in) :: pairs
 
       call self%take_coefficients(settings, pairs)
+      self%logged = [at_damping_coefficient]
       self%coefficient = weighted(pairs%damping_coefficient, pairs%stiffness, 3)
       self%is_weak = .true.
    end subroutine configure

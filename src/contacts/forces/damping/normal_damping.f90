@@ -9,6 +9,7 @@ module polydem_normal_damping
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_damping
    use polydem_kinds, only: ip, wp
+   use polydem_pair_entries, only: at_damping_coefficient
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_pair_value, only: pair_value_t, weighted
    use polydem_settings, only: forces_settings_t
@@ -142,6 +143,7 @@ contains
       type(pair_parameters_t), intent(in) :: pairs
 
       self%stage = stage_damping
+      self%logged = [at_damping_coefficient]
       self%stiffness = pairs%stiffness%one
       self%coefficient = weighted(pairs%damping_coefficient, pairs%stiffness, 1)
       self%dissipates = pairs%damping_coefficient%greatest() > 0.0_wp

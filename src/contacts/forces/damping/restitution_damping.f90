@@ -22,6 +22,7 @@ module polydem_restitution_damping
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: find_reaches, normal_damping_t
+   use polydem_pair_entries, only: at_restitution
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -52,6 +53,7 @@ contains
 
       call self%take_coefficients(settings, pairs)
       self%needs_shares = .true.
+      self%logged = [at_restitution]
       self%coefficient = pairs%restitution
       if (allocated(pairs%restitution%factor)) then
          self%coefficient%factor = damping_ratio_of(pairs%restitution%factor)
