@@ -105,6 +105,7 @@ contains
       element%inertia = bodies%inertia(s)
       element%normal_mass = 0.5_wp*bodies%mass(s)
       element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
+      element%inverse_square = bodies%mass(s)/(6.0_wp*bodies%inertia(s))
       outline = 0.0_wp
       skew = 0.0_wp
       do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip

@@ -63,7 +63,8 @@ contains
                call law%add(rate_damping_t(name='rate damping'), s)
             end if
          end if
-         if (s%damping == 'hunt_crossley') call law%add(hunt_crossley_t(name='Hunt-Crossley damping'), s)
+         if (s%damping == 'hunt_crossley') &
+            call law%add(hunt_crossley_t(name='Hunt-Crossley damping', is_of_bodies=s%law == 'polar'), s)
          if (s%damping == 'matuttis_chen') call law%add(matuttis_chen_damping_t(name='Matuttis-Chen damping'), s)
          if (s%damping == 'rate' .and. s%damping_from_touch) &
             call law%add(damping_onset_t(name='from first touch'), s)

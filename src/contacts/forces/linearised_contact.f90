@@ -29,6 +29,9 @@ module polydem_linearised_contact
       real(wp) :: inertia = 0.0_wp
       !> Sum of the reciprocal masses of both bodies, and its reciprocal, the normal effective mass [m/kg, kg/m]
       real(wp) :: normal_mobility = 0.0_wp, normal_mass = 0.0_wp
+      !> Reciprocal square of a length of the bodies, (1/I1 + 1/I2)/(6 (1/m1 + 1/m2)): that of the side of a square
+      !> [1/m2]
+      real(wp) :: inverse_square = 0.0_wp
       !> Effective mass against slip at the force point [kg/m]
       real(wp) :: tangential_mass = 0.0_wp
       !> Sum of the reciprocal moments of inertia of the free bodies [1/(kg m)]; 0 for an expected contact

@@ -43,6 +43,7 @@ contains
       element%repulsion = contacts%normal_force(c)
       element%normal_mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
       element%normal_mass = 1.0_wp/element%normal_mobility
+      element%inverse_square = alone(4)/(6.0_wp*element%normal_mobility)
       element%tangential_mass = 1.0_wp/alone(2)
       element%rotational_mobility = alone(4)
       element%rolling_radius = 1.0_wp/rolling(1)
