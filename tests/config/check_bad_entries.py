@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(sys.argv[2]).parent))
-from make_entries import read_table  # noqa: E402
+from generator.table import read_table  # noqa: E402
 
 #: Longest time of a call [s]; most take some hundredths, but the machine may be busy
 PATIENCE = 60

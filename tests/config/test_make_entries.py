@@ -5,16 +5,10 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
-from make_entries import (  # noqa: E402
-    TableError,
-    fill_module,
-    manual,
-    pair_module,
-    read_table,
-    settings_module,
-    table_module,
-    value_module,
-)
+from generator.manual import manual  # noqa: E402
+from generator.pairs import pair_module, value_module  # noqa: E402
+from generator.settings import fill_module, settings_module, table_module  # noqa: E402
+from generator.table import TableError, read_table  # noqa: E402
 
 GOOD = """# Comment
 list ways = slow fast
