@@ -39,22 +39,34 @@ def table_module(groups, rows):
                   ["namelist_entry, only: entry_t, group_length, required"], ["entries", "repeatable_groups"], body)
 
 
+def blocks_of(groups):
+    """Blocks of groups by name, each behind the one that it includes."""
+    found = {}
+    for group in groups.values():
+        chain = [group.block] if group.block else []
+        while chain and chain[-1].base:
+            chain.append(chain[-1].base)
+        found.update((block.name, block) for block in reversed(chain))
+    return found
+
+
+def type_of(name, comment, rows, block, base=""):
+    """A type of settings: the components that it has beside those of its block."""
+    common = {row.key for row in block.rows} if block else ()
+    components = "\n".join(component(row) for row in first_rows(rows, name) if row.key not in common)
+    base = f", extends({block.name}_settings_t)" if block else base
+    comment = textwrap.fill(comment, 110, initial_indent="   !> ", subsequent_indent="   !> ")
+    return f"{comment}\n   type{base} :: {name}_settings_t\n{components}\n   end type {name}_settings_t\n\n"
+
+
 def settings_module(groups, rows):
     """One type per group, one of all groups of a run, and one of a bench."""
-    body = ""
-    blocks = {group.block: group.rows for group in groups.values() if group.block}
-    for block, members in blocks.items():
-        components = "\n".join(component(row) for row in first_rows(members, block))
-        body += (f"   !> Entries that several groups include\n   type :: {block}_settings_t\n{components}\n"
-                 f"   end type {block}_settings_t\n\n")
-    for group, (meaning, _, block, members) in groups.items():
-        common = {row.key for row in members}
-        components = "\n".join(component(row) for row in first_rows(rows, group) if row.key not in common)
-        comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
-                                initial_indent="   !> ", subsequent_indent="   !> ")
-        base = ", extends(source_locations_t)" if group == BENCH else ""
-        base = f", extends({block}_settings_t)" if block else base
-        body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
+    blocks = blocks_of(groups)
+    body = "".join(type_of(name, "Entries that several groups include", block.rows, block.base)
+                   for name, block in blocks.items())
+    for name, (meaning, _, block) in groups.items():
+        body += type_of(name, f"Group &{name}" + (f": {meaning}" if meaning else ""), rows, block,
+                        ", extends(source_locations_t)" if name == BENCH else "")
     body += "   !> All settings of a run. They do not change after reading\n"
     body += "   type, extends(source_locations_t) :: settings_t\n"
     for group, (_, is_repeatable, *_) in groups.items():

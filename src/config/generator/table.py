@@ -6,8 +6,10 @@ from collections import namedtuple
 Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual mixed")
 #: Fields that may be left out at the end of a row
 LATE = 2
-#: A group, whether a file may contain it several times, and the name and the rows of the block that it includes
-Group = namedtuple("Group", "meaning is_repeatable block rows", defaults=("", ()))
+#: A group, whether a file may contain it several times, and the block that it includes
+Group = namedtuple("Group", "meaning is_repeatable block", defaults=(None,))
+#: A block, the block that it includes, and the rows of both
+Block = namedtuple("Block", "name base rows is_repeatable", defaults=(None, (), False))
 #: Types of entries: numbers and logicals, and texts
 NUMBERS = ("real", "integer", "logical")
 TEXTS = ("word", "path", "name")
@@ -39,14 +41,17 @@ def read_table(text):
             name, mark, _ = name.partition(" *")
             groups[name], block = Group(meaning, mark != ""), ""
         elif word == "block":
-            block, _, meaning = rest.partition(": ")
-            blocks[block] = Group(meaning, False)
+            block = rest.partition(": ")[0]
+            blocks[block] = Block(block)
         elif word == "include":
-            if rest not in blocks:
-                raise TableError(f"line {number}: there is no block {rest} above it")
-            name = next(reversed(groups))
-            groups[name] = groups[name]._replace(block=rest, rows=blocks[rest].rows)
-            rows += [row._replace(group=name) for row in blocks[rest].rows]
+            base = included(with_lists(rest, lists, number), blocks, number)
+            if block:
+                more = tuple(row._replace(group=block) for row in base.rows)
+                blocks[block] = Block(block, base, blocks[block].rows + more)
+            else:
+                name = next(reversed(groups))
+                groups[name] = groups[name]._replace(block=base)
+                rows += [row._replace(group=name) for row in base.rows]
         elif word == "list":
             name, _, words = rest.partition(" = ")
             lists[name] = with_lists(words.strip(), lists, number)
@@ -60,6 +65,15 @@ def read_table(text):
         if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
             raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def included(text, blocks, number):
+    """The block of a line `include BLOCK`, or `include BLOCK with CONDITION`, with which all of its rows are used."""
+    name, _, condition = text.partition(" with ")
+    if name not in blocks:
+        raise TableError(f"line {number}: there is no block {name} above it")
+    block = blocks[name]
+    return block._replace(rows=tuple(row._replace(needs=condition) for row in block.rows)) if condition else block
 
 
 def read_row(line, lists, number, groups, earlier):
@@ -79,7 +93,8 @@ def read_row(line, lists, number, groups, earlier):
 
 def is_included(row, groups):
     """Whether a row is that of the block that its group includes."""
-    return any(row == other._replace(group=row.group) for other in groups[row.group].rows)
+    block = groups[row.group].block
+    return block is not None and any(row == other._replace(group=row.group) for other in block.rows)
 
 
 def is_replaced(row, groups, rows):
