@@ -10,22 +10,12 @@ module polydem_collect_entries
    use polydem_strings, only: lower_case, quoted, suggestion, to_text
    implicit none
    private
-   public :: collect_entries, equal_keys
+   public :: collect_entries
 
    !> Greatest number of characters of an override in a message
    integer, parameter :: longest_override = 200
    !> Greatest number of characters of the name of an instance. Names of columns of the series begin with one
    integer, parameter :: longest_name = 64
-
-   !> Keys of &scene that another group calls otherwise: key, group, key of that group
-   character(len=16), parameter :: equal_keys(3, 13) = reshape([character(len=16) :: &
-      'bodies', 'grains', 'number', &
-      'corners_min', 'grains', 'corners', 'corners_max', 'grains', 'corners', &
-      'corners_min', 'source', 'corners', 'corners_max', 'source', 'corners', &
-      'corners_min', 'wall', 'corners', 'corners_max', 'wall', 'corners', &
-      'long_axis_min', 'grains', 'long_axis', 'long_axis_max', 'grains', 'long_axis', &
-      'long_axis_min', 'source', 'long_axis', 'long_axis_max', 'source', 'long_axis', &
-      'slope', 'wall', 'angle', 'wall_material', 'wall', 'material'], [3, 13])
 
 contains
 
@@ -181,25 +171,12 @@ contains
             ' is '//new_name(statement)//' today')
       else if (owners /= '') then
          call raise(error, input_error, statement%place//': '//quoted(statement%key)//' is a key of '//owners// &
-            ', not of &'//statement%group//equal_key(statement))
+            ', not of &'//statement%group)
       else
          call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
             statement%group//suggestion(statement%key, keys_of(statement%group)))
       end if
    end subroutine raise_unknown_key
-
-   !> Clause about the key of a group that does what a key of &scene does; empty if there is none
-   pure function equal_key(statement) result(clause)
-      type(statement_t), intent(in) :: statement
-      character(len=:), allocatable :: clause
-      integer :: k
-
-      clause = ''
-      do k = 1, size(equal_keys, 2)
-         if (statement%key /= equal_keys(1, k) .or. statement%group /= equal_keys(2, k)) cycle
-         clause = ', which has '//quoted(trim(equal_keys(3, k)))
-      end do
-   end function equal_key
 
    !> Clause about a key that has another name today; empty for others
    pure function new_name(statement) result(clause)
@@ -214,6 +191,8 @@ contains
       case ('scene.motion_bodies', 'scene.motion_pivot', 'scene.motion_rate', 'scene.motion_velocity', &
             'scene.motion_amplitude', 'scene.motion_frequency', 'scene.motion_start', 'scene.motion_ramp')
          clause = statement%key(len('motion_') + 1:)//' in a group &motion'
+      case ('scene.corners_min', 'scene.corners_max', 'scene.long_axis_min', 'scene.long_axis_max')
+         clause = 'one of the two values of '//statement%key(:len(statement%key) - len('_min'))//' in &scene'
       case ('integrate.fraction')
          clause = 'safety_factor in &integrate'
       case ('guards.passing')

@@ -45,7 +45,7 @@ contains
       ! Grains that start with a speed may rise above the lattice.
       grains%high = [0.5_wp*width, height + 2.0_wp*loose_spacing(grains)]
       call parts%add_grains(grains)
-      call parts%add_box(grains%low, grains%high, scene%long_axis_max*sqrt(scene%size_ratio), closed=.false.)
+      call parts%add_box(grains%low, grains%high, scene%long_axis(2)*sqrt(scene%size_ratio), closed=.false.)
    end subroutine make_bed
 
    !> Height that loose grains need [m]; negative if the bed is too narrow for one grain

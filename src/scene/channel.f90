@@ -31,19 +31,19 @@ contains
 
       grains = moving_grains(scene)
       grains%arrangement = 'row'
-      height = height_share*scene%long_axis_max
+      height = height_share*scene%long_axis(2)
       length = area_of_grains(grains, scene%seed)/(scene%solid_fraction*height)
       spacing = length/real(scene%bodies, wp)
       if (spacing < loose_spacing(grains)) then
          call raise(error, input_error, 'solid_fraction is too large for a row of grains without overlap at the '// &
                     'start; lower solid_fraction to '// &
-                    to_text(0.99_wp*scene%solid_fraction*spacing/loose_spacing(grains), 3)//', or lower long_axis_max')
+                    to_text(0.99_wp*scene%solid_fraction*spacing/loose_spacing(grains), 3)//', or lower long_axis')
          return
       end if
       grains%low = [-0.5_wp*length, -0.5_wp*height]
       grains%high = [0.5_wp*length, 0.5_wp*height]
       call parts%add_grains(grains)
-      call parts%add_box(grains%low, grains%high, scene%long_axis_max, closed=.true.)
+      call parts%add_box(grains%low, grains%high, scene%long_axis(2), closed=.true.)
    end subroutine make_channel
 
 end module polydem_channel

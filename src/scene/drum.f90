@@ -88,7 +88,7 @@ contains
    pure real(wp) function mean_axis(scene)
       type(scene_settings_t), intent(in) :: scene
 
-      mean_axis = 0.5_wp*(scene%long_axis_min + scene%long_axis_max)
+      mean_axis = 0.5_wp*(scene%long_axis(1) + scene%long_axis(2))
    end function mean_axis
 
 end module polydem_drum

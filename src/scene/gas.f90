@@ -36,10 +36,10 @@ contains
       low = grains%low
       high = grains%high
       if (scene%overlap) then
-         low = low + 0.5_wp*scene%long_axis_max*sign(1.0_wp, low)
-         high = high + 0.5_wp*scene%long_axis_max*sign(1.0_wp, high)
+         low = low + 0.5_wp*scene%long_axis(2)*sign(1.0_wp, low)
+         high = high + 0.5_wp*scene%long_axis(2)*sign(1.0_wp, high)
       end if
-      call parts%add_box(low, high, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
+      call parts%add_box(low, high, scene%long_axis(2)*sqrt(scene%size_ratio), closed=.true.)
    end subroutine make_gas
 
    !> Grains in a box with random velocities. Their total momentum is zero unless one grain alone moves
@@ -128,7 +128,7 @@ contains
       fraction = ''
       if (fits > 0.0_wp) fraction = ' to '//to_text(fits, 2)
       text = 'solid_fraction is too large for grains without overlap at the start; lower solid_fraction'//fraction// &
-             ', or change width or long_axis_max'
+             ', or change width or long_axis'
    end subroutine explain_gas
 
 end module polydem_gas

@@ -47,7 +47,7 @@ contains
       grains%low = [-0.5_wp*column, 0.0_wp]
       grains%high = [0.5_wp*column, height]
       call parts%add_grains(grains)
-      call parts%add_box([-0.5_wp*length, 0.0_wp], [0.5_wp*length, height], scene%long_axis_max, closed=.false.)
+      call parts%add_box([-0.5_wp*length, 0.0_wp], [0.5_wp*length, height], scene%long_axis(2), closed=.false.)
    end subroutine make_heap
 
 end module polydem_heap

@@ -30,7 +30,7 @@ contains
 
       grains = recipe_grains(scene)
       grains%number = scene%bodies
-      thickness = scene%long_axis_max
+      thickness = scene%long_axis(2)
       half = 0.5_wp*hopper_width(scene, grains)
       lip = 0.5_wp*scene%opening
       if (lip >= half) then

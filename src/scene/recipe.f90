@@ -18,9 +18,7 @@ contains
       grains = new_grains('grains')
       if (scene%packing /= '') grains%arrangement = 'packing'
       grains%packing = scene%packing
-      grains%corners = [scene%corners_min, scene%corners_max]
-      grains%short_axis = scene%short_axis
-      grains%long_axis = [scene%long_axis_min, scene%long_axis_max]
+      grains%ellipse_settings_t = scene%ellipse_settings_t
       grains%angle = [0.0_wp, 360.0_wp]
       grains%size_ratio = scene%size_ratio
       if (scene%size_ratio > 1.0_wp) grains%sizes = 'octaves'

@@ -25,7 +25,7 @@ module polydem_scene
    public :: build_scene
 
    !> Entries that determine shapes and masses of generated bodies, for a message
-   character(len=*), parameter :: sizes = 'short_axis, long_axis_max, solid_fraction, radius, width, height and density'
+   character(len=*), parameter :: sizes = 'short_axis, long_axis, solid_fraction, radius, width, height and density'
 
    !> Greatest identifier of a bodies file beside parts
    integer(ip), parameter :: most_id = 2_ip**30

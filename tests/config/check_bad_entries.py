@@ -10,7 +10,6 @@ Without --full a sample of all cases is tried, which has each row of the table.
 """
 
 import concurrent.futures
-import itertools
 import os
 import random
 import re
@@ -23,7 +22,7 @@ from typing import NamedTuple
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(sys.argv[2]).parent))
-from make_entries import read_table  # noqa: E402
+from generator.table import read_table  # noqa: E402
 
 #: Longest time of a call [s]; most take some hundredths, but the machine may be busy
 PATIENCE = 60
@@ -32,45 +31,41 @@ SAMPLE = 250
 #: Seed of the sample
 SEED = 32
 
-#: Required entries of each scene
-SCENES = {
-    "drum": {"bodies": "20"}, "hopper": {"bodies": "20", "opening": "0.03", "slope": "45"},
-    "gas": {"bodies": "20", "speed": "1"}, "bed": {"bodies": "20"}, "heap": {"bodies": "20"},
-    "channel": {"bodies": "20", "speed": "1"}, "incline": {"width": "0.02", "height": "0.01", "slope": "30"},
-    "stack": {"bodies": "3", "width": "0.01", "height": "0.01"},
-}
 #: Name of the instance of a repeatable group
 NAME = "only_1"
-#: Required entries of each motion
-MOTIONS = {"rotation": {"rate": "1"}, "translation": {"velocity": "0.1, 0"},
-           "oscillation": {"amplitude": "1e-3, 0", "frequency": "10"},
-           "conveyor": {"velocity": "0.1, 0"}, "table": {"file": "'none.csv'"}}
-#: Required entries of each kind of wall, region, arrangement and shape of grains, by the entry and its word
-PARTS = {
-    "outline": {"line": {"from": "-1, -1", "to": "2, -1", "thickness": "0.1"},
-                "polyline": {"vertices": "-1, -1, 1, -1, 2, 0", "thickness": "0.1"},
-                "rectangle": {"low": "-1, -2", "high": "2, -1"}, "bodies": {"bodies": "1"},
-                "ring": {"centre": "0.5, 0.5", "radius": "1", "segments": "20", "thickness": "0.1"},
-                "polygon": {"vertices": "-1, -2, 1, -2, 0, -1"}, "result": {},
-                "row": {"from": "-1, -1", "to": "2, -1", "radius": "0.1", "segments": "10"}},
-    "region": {"box": {"low": "0, 0", "high": "0.2, 0.2"}, "disc": {"radius": "0.1"}, "at": {"at": "0.1, 0.1"},
-               "polygon": {"vertices": "0, 0, 0.2, 0, 0.2, 0.2, 0, 0.2"}, "inside": {"wall": f"'{NAME}'"}},
-    "arrangement": {"loose": {}, "spread": {}, "row": {}, "random": {}, "single": {"region": "at"},
-                    "column": {"region": "at", "shape": "rectangle"}, "packing": {"packing": "'none'"},
-                    "voronoi": {"gap": "1e-4"}},
-    "shape": {"ellipse": {}, "regular": {"diameter": "8e-3, 9e-3"}, "random": {"diameter": "8e-3, 9e-3"},
-              "rectangle": {"width": "9e-3", "height": "4e-3"}, "cross": {"width": "9e-3", "arm": "3e-3"},
-              "outline": {"outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3"}},
-    "sizes": {"uniform": {}, "octaves": {"size_ratio": "2"}, "log_normal": {"size_spread": "1.2"},
-              "grading": {"grading": "1, 0, 2, 1"}}, "momentum": {"random": {}, "zero": {}},
+#: Scenes that need a file, and the one of parts
+NO_RECIPES = ("file", "result", "parts")
+#: Values of required entries: by group.key@word with the word that they are used with, by group.key, or by key
+GIVEN = {
+    "bodies": "20", "opening": "0.03", "slope": "45", "scene.width": "0.02", "scene.height": "0.01", "speed": "1",
+    "kind": "rotation", "rate": "1", "velocity": "0.1, 0", "amplitude": "1e-3, 0", "frequency": "10",
+    "motion.file": "'none.csv'", "duration": "1e-3", "stage.duration": "1", "longest": "1", "component": "xx",
+    "from": "-1, -1", "to": "2, -1", "wall.low": "-1, -2", "wall.high": "2, -1", "thickness": "0.1", "segments": "10",
+    "wall.radius@ring": "1", "wall.radius@row": "0.1", "wall.vertices@polyline": "-1, -1, 1, -1, 2, 0",
+    "wall.vertices@polygon": "-1, -2, 1, -2, 0, -1",
+    "grains.low": "0, 0", "grains.high": "0.2, 0.2", "grains.radius": "0.1", "at": "0.1, 0.1",
+    "grains.vertices": "0, 0, 0.2, 0, 0.2, 0.2, 0, 0.2", "packing": "'none'",
+    "wall": f"'{NAME}'", "opposite": f"'{NAME}'", "materials": f"'{NAME}', '{NAME}'",
+    "diameter": "8e-3, 9e-3", "width": "9e-3", "height": "4e-3", "arm": "3e-3", "size_ratio": "2",
+    "size_spread": "1.2", "grading": "1, 0, 2, 1",
+    "cell.size": "1, 1", "direction": "x", "sample.low": "0, 0", "sample.high": "1, 1",
+    "source.low": "0.3, 0.3", "source.high": "0.5, 0.5", "sink.low": "-1, -3", "sink.high": "2, -2.5",
 }
-#: Required entries of groups that need a scene of parts
-REQUIRED = {"cell": {"periodic": "xy", "size": "1, 1"}, "load": {"wall": f"'{NAME}'", "direction": "x", "force": "1"},
-            "stage": {},
-            "source": {"low": "0.3, 0.3", "high": "0.5, 0.5", "count": "9"},
-            "sink": {"low": "-1, -3", "high": "2, -2.5"},
-            "sample": {},
-            "contact_pair": {"materials": f"'{NAME}', '{NAME}'", "friction_coefficient": "0.1"}}
+#: What a group needs beside its required entries: by group, group.key=word or key=word
+BESIDE = {
+    "name=drum": {"bodies": GIVEN["bodies"]},
+    "grains": {"region": "box", "number": "9"}, "region=at": {"number": "1"},
+    "arrangement=single": {"region": "at"}, "arrangement=column": {"number": "9", "region": "at", "shape": "rectangle"},
+    "arrangement=voronoi": {"gap": "1e-4"}, "shape=outline": {"outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3"},
+    "wall": {"outline": "rectangle"}, "outline=bodies": {"bodies": "1"}, "outline=ring": {"centre": "0.5, 0.5"},
+    "cell": {"periodic": "xy"}, "source": {"count": "9"}, "contact_pair": {"friction_coefficient": "0.1"},
+    "direction=x": {"force": "1"}, "direction=y": {"force": "1"}, "direction=angle": {"torque": "1"},
+    "area=walls": {"sides": f"'{NAME}', '{NAME}'"}, "until=departed": {"above": "1"},
+    "until=count": {"below": "1", "low": "0, 0", "high": "1, 1"},
+    "until=solid_fraction": {"below": "1", "low": "0, 0", "high": "1, 1"},
+}
+#: Groups that need a scene of parts
+IN_PARTS = ("cell", "load", "stage", "source", "sink", "sample", "contact_pair")
 #: What is not a number, or not one number
 NO_NUMBERS = ("'text'", "word", ".true.", "nan", "NaN", "inf", "-inf", "Infinity", "", "1 2 3", "1, 2, 3", ",", "1,,2",
               "0x10", "1_4", "2**1", "2*", "*1", "(1,2)", "1.e", "--1", "1e+", "+", "1d400", "1e400", "1e999999",
@@ -118,84 +113,93 @@ def entry_of(group, key):
     return f"{group}.{NAME}.{key}" if group in REPEATABLE else f"{group}.{key}"
 
 
+def choose(group, chosen, key, value):
+    """Give an entry of a group a value unless it has one, and with it what it needs."""
+    if key in chosen:
+        return
+    chosen[key] = value
+    for other, given in BESIDE.get(f"{group}.{key}={value}", BESIDE.get(f"{key}={value}", {})).items():
+        choose(group, chosen, other, given)
+
+
+def decider_of(row, chosen):
+    """The value of the entry with which a row is used; empty if it is always used."""
+    key = row.needs.partition(":")[0]
+    rows = (each for each in ROWS if (each.group, each.key) == (row.group, key) and is_used(each, chosen))
+    return chosen.get(key, next((each.default for each in rows), "")) if key else ""
+
+
+def is_used(row, chosen):
+    """Whether a row is in use beside chosen entries of its group."""
+    return not row.needs or decider_of(row, chosen) in row.needs.partition(":")[2].split()
+
+
+def entries_of(group, key="", word=""):
+    """A group with all that it needs, and with a word of one of its entries."""
+    chosen = {}
+    for name, value in [*([(key, word)] if key else []), *BESIDE.get(group, {}).items()]:
+        choose(group, chosen, name, value)
+    for row in ROWS:
+        if row.group != group or row.key in ("name", *chosen) or row.default != "required" or not is_used(row, chosen):
+            continue
+        names = (f"{group}.{row.key}@{decider_of(row, chosen)}", f"{group}.{row.key}", row.key)
+        value = next((GIVEN[name] for name in names if name in GIVEN), None)
+        if value is None:
+            sys.exit(f"{group}.{row.key} is required and has no value in GIVEN of check_bad_entries.py: add one")
+        choose(group, chosen, row.key, value)
+    if chosen.get("until", "duration") != "duration" and "above" not in chosen:
+        chosen.setdefault("below", "1")
+    return chosen
+
+
+def named(groups):
+    """Groups with their entries as settings, each repeatable one with its name."""
+    return {entry_of(group, name): value for group, given in groups.items()
+            for name, value in {**({"name": f"'{NAME}'"} if group in REPEATABLE else {}), **given}.items()}
+
+
 def contexts(row):
     """Settings with which a row is in use."""
-    if row.group in ("grains", "wall"):
-        for parts in parts_with(row):
-            yield {**parts, "integrate.duration": "1e-3"}
-        return
-    if row.group in REQUIRED:
-        yield from with_required(row)
-        return
     key, _, words = row.needs.rpartition(":")
-    scenes, others = ["bed"], [{}]
-    if row.group == "scene" and key == "name":
-        scenes = [word for word in words.split() if word in SCENES]
-    elif row.group == "scene" and not key:
-        scenes = list(SCENES)
-    elif row.group == "motion":
-        others = [{entry_of("motion", key): value for key, value in {"kind": word, **MOTIONS[word]}.items()}
-                  for word in words.split() or MOTIONS]
-    elif key:
-        others = [{entry_of(row.group, key): word} for word in words.split()]
-    if row.group in REPEATABLE:
-        others = [{entry_of(row.group, "name"): f"'{NAME}'", **other} for other in others]
-    for scene, other in itertools.product(scenes, others):
-        yield {"scene.name": scene, **{f"scene.{key}": value for key, value in SCENES[scene].items()}, **other,
-               "integrate.duration": "1e-3"}
+    duration = {"integrate.duration": GIVEN["duration"]}
+    for word in words.split() or [""]:
+        if row.group in ("grains", "wall"):
+            yield {**named(parts_with(entries_of(row.group, word and key, word), row.group)), **duration}
+        elif row.group in IN_PARTS:
+            groups = scene_of_parts(row.group, entries_of(row.group, word and key, word))
+            yield {**named(groups), **({} if row.group == "stage" else duration)}
+        elif row.group == "scene":
+            yield from ({**named({"scene": entries_of("scene", "name", scene)}), **duration}
+                        for scene in ([word] if word else words_of("scene", "name")) if scene not in NO_RECIPES)
+        else:
+            kinds = [word] if word or row.group != "motion" else words_of("motion", "kind")
+            key = key or "kind" * (row.group == "motion")
+            yield from ({**named({"scene": entries_of("scene", "name", "bed"),
+                                  row.group: entries_of(row.group, key, kind)}), **duration} for kind in kinds)
 
 
-def with_required(row):
-    """A scene of parts with a group and its required entries, with which a row of the group is in use."""
-    key, _, words = row.needs.rpartition(":")
-    parts = {"wall": {"outline": "rectangle", **PARTS["outline"]["rectangle"]},
-             "grains": {"region": "box", "number": "9", **PARTS["region"]["box"]}, "material": {}}
-    for word in words.split() or [None]:
-        entries = {**REQUIRED[row.group], **({key: word} if word else {})}
-        if row.group == "stage":
-            until = entries.setdefault("until", "duration")
-            entries.update({"duration": "1"} if until == "duration" else {"longest": "1", "below": "1"})
-            entries.update({"wall": f"'{NAME}'", "opposite": f"'{NAME}'"} if until == "strain" else {})
-            entries.update({"low": "0, 0", "high": "1, 1"} if until in ("count", "solid_fraction") else {})
-            entries.update({"component": "xx"} if until == "stress" else {})
-            if until == "departed":
-                entries["above"] = entries.pop("below")
-        if row.group == "source":
-            entries.update(PARTS["shape"][entries.setdefault("shape", "ellipse")])
-            entries.update(PARTS["sizes"][entries.setdefault("sizes", "octaves")])
-        if entries.get("area") == "rectangle":
-            entries.update({"low": "0, 0", "high": "1, 1"})
-        if row.group == "sample" and word == "walls":
-            entries.update({"sides": f"'{NAME}', '{NAME}'"})
-        if entries.get("direction") == "angle":
-            entries["torque"] = entries.pop("force")
-        groups = {**({"grains": parts["grains"]} if row.group == "cell" else parts), row.group: entries}
-        if row.group == "cell":
-            groups["forces"] = {"gravity": "0, 0"}
-        if entries.get("until") == "departed":
-            groups["sink"] = REQUIRED["sink"]
-        if entries.get("until") == "stress":
-            groups["sample"] = {"area": "rectangle", "low": "0, 0", "high": "1, 1"}
-        yield {**{entry_of(group, name): value for group, given in groups.items()
-                  for name, value in {**({"name": f"'{NAME}'"} if group in REPEATABLE else {}), **given}.items()},
-               **({} if row.group == "stage" else {"integrate.duration": "1e-3"})}
+def words_of(group, key):
+    """All words of an entry."""
+    return next(row.allowed.split() for row in ROWS if (row.group, row.key) == (group, key))
 
 
-def parts_with(row):
-    """Walls and grains with which a row of one of their groups is in use."""
-    key, _, words = row.needs.rpartition(":")
-    for word in words.split() or [None]:
-        wall, grains = {"outline": "rectangle"}, {"region": "box", "number": "9"}
-        (wall if row.group == "wall" else grains).update({key: word} if word else {})
-        wall.update(PARTS["outline"][wall["outline"]])
-        for name in 2 * ["arrangement", "shape", "sizes", "momentum", "region"]:
-            grains.update(PARTS[name].get(grains.get(name), {}))
-        if grains["region"] == "inside":
-            wall = {"outline": "ring", **PARTS["outline"]["ring"]}
-        if grains["region"] == "at" and grains.get("arrangement") != "column":
-            grains["number"] = "1"
-        yield {entry_of(group, name): value for group, entries in (("wall", wall), ("grains", grains))
-               for name, value in {"name": f"'{NAME}'", **entries}.items()}
+def parts_with(entries, group):
+    """Walls and grains, of which one group has given entries."""
+    grains = entries if group == "grains" else entries_of("grains")
+    shape = "ring" if grains.get("region") == "inside" else "rectangle"
+    return {"wall": entries if group == "wall" else entries_of("wall", "outline", shape), "grains": grains}
+
+
+def scene_of_parts(group, entries):
+    """A scene of parts with a group."""
+    parts = {"wall": entries_of("wall"), "grains": entries_of("grains"), "material": {}}
+    if group == "cell":
+        parts = {"grains": parts["grains"], "forces": {"gravity": "0, 0"}}
+    if entries.get("until") == "departed":
+        parts["sink"] = entries_of("sink")
+    if entries.get("until") == "stress":
+        parts["sample"] = entries_of("sample", "area", "rectangle")
+    return {**parts, group: entries}
 
 
 def all_cases(rows):
@@ -312,6 +316,7 @@ def main():
     program, table = str(Path(sys.argv[1]).resolve()), sys.argv[2]
     groups, rows = read_table(Path(table).read_text(encoding="utf-8"))
     REPEATABLE.update(name for name, group in groups.items() if group.is_repeatable)
+    ROWS.extend(rows)
     WORDS.update(entry_of(row.group, row.key) for row in rows if row.type == "word")
     cases = list(all_cases(rows))
     tried = [case for each in cases for case in each] if "--full" in sys.argv else sample(cases)
@@ -326,8 +331,8 @@ def main():
     sys.exit(faults > 0)
 
 
-#: Entries that are words, and groups that have names
-WORDS, REPEATABLE = set(), set()
+#: Rows of the table, entries that are words, and groups that have names
+ROWS, WORDS, REPEATABLE = [], set(), set()
 
 if __name__ == "__main__":
     main()

@@ -5,16 +5,10 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
-from make_entries import (  # noqa: E402
-    TableError,
-    fill_module,
-    manual,
-    pair_module,
-    read_table,
-    settings_module,
-    table_module,
-    value_module,
-)
+from generator.manual import manual  # noqa: E402
+from generator.pairs import pair_module, value_module  # noqa: E402
+from generator.settings import fill_module, settings_module, table_module  # noqa: E402
+from generator.table import TableError, read_table  # noqa: E402
 
 GOOD = """# Comment
 list ways = slow fast
@@ -115,6 +109,14 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("type, extends(size_settings_t) :: box_settings_t\n      !> Name\n      character(len=:), "
                       "allocatable :: name\n   end type", made)
         self.assertEqual(made.count("real(wp) :: width"), 1)
+        text = text.replace("group box", "block room: larger\nroom | height | real | 1 | 4 | m | > 0 | - | Height\n"
+                            "include size\ngroup hall\nhall | way | word | 1 | - | - | a wide | - | Way\n"
+                            "include room with way: a\ngroup box")
+        groups, rows = read_table(text)
+        self.assertEqual([f"{row.key} {row.needs}" for row in rows if row.group == "hall"],
+                         ["way ", "height way: a", "width way: a"])
+        self.assertRegex(settings_module(groups, rows), r"(?s) :: size_settings_t\n.* extends\(size_settings_t\) :: "
+                         r"room_settings_t\n      !> Height.* extends\(room_settings_t\) :: hall_settings_t\n\n   end")
         with self.assertRaisesRegex(TableError, "line 6: there is no block sice above it"):
             read_table(text.replace("include size\ngroup", "include sice\ngroup"))
 

@@ -72,18 +72,14 @@ GUARDS = {
 }
 #: Name of the group in cases of a group that may be there several times
 NAME = "one"
+#: Groups that have numbers of &forces
+PAIRS = ("material", "contact_pair")
 #: Beginnings of the entries of parts, which need a scene of parts
 PARTS = (f"grains.{NAME}.", f"wall.{NAME}.")
-#: Entries of sources and sinks
-TRAFFIC = tuple(f"{group}.{NAME}.{key}" for group, keys in {
-    "source": "low high rate count interval stage velocity corners short_axis long_axis diameter width height arm "
-              "outline outline_corners outline_pieces outlines elongation size_spread grading angle size_ratio "
-              "material density seed",
-    "sink": "low high interval stage"}.items() for key in keys.split())
-YIELDING = tuple(f"cell.{key}" for key in "stress stress_ramp mass damping_ratio stage".split())
-#: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
+#: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene. Those of
+#: materials and of pairs are those of &forces
 VARIED = {
-    "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.packing": None, "scene.corners_min": "3",
+    "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.corners_min": "3",
     "scene.corners_max": "20", "scene.short_axis": "7.5e-3", "scene.long_axis_min": "9e-3",
     "scene.long_axis_max": "15e-3", "scene.size_ratio": "5", "scene.density": "1000", "scene.radius": "0.08",
     "scene.width": "0.15",
@@ -92,42 +88,37 @@ VARIED = {
     "scene.moving_grains": "5", "scene.motion_pivot": "0.01, 0.02", "scene.motion_rate": "1",
     "scene.motion_velocity": "0.1, 0.2",
     "scene.motion_amplitude": "1e-3, 0", "scene.motion_frequency": "50", "scene.motion_start": "0.005",
-    "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84", "scene.bodies_file": None,
+    "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84",
     "motion.one.bodies": "82, 84", "motion.one.pivot": "0.01, 0.02", "motion.one.rate": "1",
     "motion.one.velocity": "0.1, 0.2", "motion.one.amplitude": "1e-3, 0", "motion.one.frequency": "50",
-    "motion.one.start": "0.005", "motion.one.ramp": "0.01", "motion.one.end": "0.02", "motion.one.file": None,
+    "motion.one.start": "0.005", "motion.one.ramp": "0.01", "motion.one.end": "0.02",
     "wall.one.from": "-0.2, -0.2", "wall.one.to": "0.2, -0.2", "wall.one.low": "-0.2, -0.2",
     "wall.one.high": "0.2, -0.11", "wall.one.angle": "3", "wall.one.centre": "0.01, 0", "wall.one.radius": "0.12",
     "wall.one.segments": "30", "wall.one.vertices": "-0.2, -0.3, 0.2, -0.3, 0, -0.15", "wall.one.thickness": "0.02",
-    "wall.one.bodies": None, "wall.one.vanish_at": "0.01", "motion.one.wall": "one",
+    "wall.one.vanish_at": "0.01", "motion.one.wall": "one",
     "load.one.wall": "one", "load.one.force": "20", "load.one.stress": "200", "load.one.width": "0.2",
-    "load.one.between": None, "load.one.torque": "1", "load.one.pivot": "0.01, 0.02", "load.one.mass": "2",
+    "load.one.torque": "1", "load.one.pivot": "0.01, 0.02", "load.one.mass": "2",
     "load.one.damping_ratio": "0.3", "load.one.start": "0.005", "load.one.end": "0.015", "load.one.ramp": "0.01",
     "grains.one.low": "-0.05, -0.05", "grains.one.high": "0.05, 0.05", "grains.one.centre": "0.01, 0",
     "grains.one.radius": "0.08", "grains.one.vertices": "-0.05, -0.05, 0.05, -0.05, 0, 0.05", "grains.one.wall": "one",
     "grains.one.at": "0.01, 0", "grains.one.number": "30", "grains.one.number@at": None,
-    "grains.one.solid_fraction": "0.2", "grains.one.packing": None, "grains.one.corners": "5, 9",
+    "grains.one.solid_fraction": "0.2", "grains.one.corners": "5, 9",
     "grains.one.short_axis": "7e-3", "grains.one.long_axis": "9e-3, 12e-3", "grains.one.diameter": "8e-3, 9e-3",
     "grains.one.width": "6e-3", "grains.one.height": "4e-3", "grains.one.arm": "2e-3",
     "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
-    "grains.one.outline_corners": "3, 4", "grains.one.outline_pieces": "1, 1, 2", "grains.one.outlines": None,
+    "grains.one.outline_corners": "3, 4", "grains.one.outline_pieces": "1, 1, 2",
     "grains.one.elongation": "2",
     "grains.one.lloyd_steps": "3", "grains.one.gap": "2e-4",
     "grains.one.size_spread": "1.3", "grains.one.grading": "1, 0, 1.5, 0.4, 2, 1",
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6",
-    "cell.shear_rate": None, "cell.shear_ramp": None,
-    **dict.fromkeys(YIELDING, None), "wall.one.corners": "6",
-    "motion.one.stage": None, "load.one.stage": None,
-    **dict.fromkeys(TRAFFIC, None),
-    "scene.start_from": None, "stage.one.duration": "0.02", "stage.one.below": "1e-3",
+    "wall.one.corners": "6",
+    "stage.one.duration": "0.02", "stage.one.below": "1e-3",
     "stage.one.above": "1e-3", "stage.one.hold": "1e-3", "stage.one.longest": "0.02", "stage.one.check": "7",
-    "stage.one.wall": None, "stage.one.opposite": None, "stage.one.sink": None,
     "stage.one.low": "-0.01, -0.01", "stage.one.high": "0.01, 0.01",
     "stage.one.gravity": "1, -20", "stage.one.friction_scale": "0.5", "stage.one.drag": "2",
-    "stage.one.component": None, "sample.low": "-0.05, -0.05", "sample.high": "0.05, 0.05", "sample.sides": None,
-    "sample.ends": None,
+    "sample.low": "-0.05, -0.05", "sample.high": "0.05, 0.05",
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.stiffness_over_pressure": "2e3",
     "forces.damping_coefficient": "0.2",
@@ -138,17 +129,14 @@ VARIED = {
     "forces.drag": "2", "forces.cohesion": "2e4", "forces.rolling_friction": "0.2", "forces.rolling_damping": "0.8",
     "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
     "wall.one.material": "one", "material.one.density": "1000", "contact_pair.one.materials": "one', 'one",
-    **{f"{group}.one.{key}": value for group in ("material", "contact_pair") for key, value in {
-        "stiffness": "1e6", "restitution": "0.3", "damping_coefficient": "0.2", "friction_coefficient": "0.6",
-        "tangential_stiffness": "0.5", "cohesion": "2e4", "rolling_friction": "0.2"}.items()},
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
     "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
     "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
     "decomposition.margin": "1e-3", "decomposition.imbalance": "2",
-    "output.folder": None, "output.frame_interval": "0.002", "output.frames_per_segment": "3",
+    "output.frame_interval": "0.002", "output.frames_per_segment": "3",
     "output.log_interval": "1e-3",
     "output.series_interval": "1e-3", "output.trace_steps": "20", "output.trace_start": "0.01",
-    "checkpoint.steps": "50", "checkpoint.interval": "0.01", "checkpoint.elapsed": None,
+    "checkpoint.steps": "50", "checkpoint.interval": "0.01",
 }
 #: A triangle and a square
 TWO_OUTLINES = "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3, -3e-3, -3e-3, 3e-3, -3e-3, 3e-3, 3e-3, -3e-3, 3e-3"
@@ -158,19 +146,8 @@ BAR_AND_FOOT = ", 0, 0, 2e-3, 0, 2e-3, 6e-3, 0, 6e-3, 2e-3, 0, 5e-3, 0, 5e-3, 2e
 BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"},
           **{name: {"material.one.density": "1000", "material.one.stiffness": "3e5"} for name in (
               "scene.material", "scene.wall_material", "grains.one.material", "wall.one.material")},
-          **{f"material.one.{key}": {"scene.material": "one"} for key in (
-              "density", "stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion",
-              "rolling_friction")},
-          "material.one.damping_coefficient": {"scene.material": "one", "forces.damping_coefficient": "0.1"},
-          **{f"contact_pair.one.{key}": {"material.one.density": "1000", "scene.material": "one",
-                                         "contact_pair.one.materials": VARIED["contact_pair.one.materials"]}
-             for key in ("stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion",
-                         "rolling_friction")},
           "contact_pair.one.materials": {"material.one.density": "1000", "scene.material": "one",
                                          "contact_pair.one.friction_coefficient": "0.6"},
-          "contact_pair.one.damping_coefficient": {
-              "material.one.density": "1000", "scene.material": "one", "forces.damping_coefficient": "0.1",
-              "contact_pair.one.materials": VARIED["contact_pair.one.materials"]},
           "grains.one.outline_corners": {"grains.one.outline": TWO_OUTLINES},
           "grains.one.outline_pieces": {"grains.one.outline": TWO_OUTLINES + BAR_AND_FOOT,
                                         "grains.one.outline_corners": "3, 4, 4, 4"},
@@ -183,17 +160,15 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           "forces.shake": {"forces.shake_frequency": "40"}, "forces.shake_frequency": {"forces.shake": "5, 10"},
           "forces.rolling_damping": {"forces.rolling_friction": "0.2"},
           "output.csv": {"output.series_interval": "1e-3"}}
-#: Why entries have None above: where else they are tried
+#: Where entries without a value above are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
              **dict.fromkeys(("motion.one.stage", "load.one.stage",
                                "scene.start_from", "stage.one.wall", "stage.one.opposite", "stage.one.sink"),
                              "check_stages.py"),
-             **dict.fromkeys(TRAFFIC, "tests/ranks: scene flow"),
              **dict.fromkeys(("stage.one.component", "sample.sides", "sample.ends"), "test_time_series.py"),
              "motion.one.file": "test_motion_file.pf", "load.one.between": "inputs/biaxial.nml",
              "wall.one.bodies": "as motion.one.bodies", "cell.shear_rate": "tests/ranks: not with walls",
              "cell.shear_ramp": "as cell.shear_rate",
-             **dict.fromkeys(YIELDING, "tests/ranks: scene yielding"),
              "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack", "grains.one.outlines": "test_shapes.pf",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
@@ -313,7 +288,7 @@ def entry_cases(entries):
             base = {key: value for key, value in base.items() if fits(key, base, entries)}
         base = base_of(entry, base)
         for value in values_of(entry, "at" if base.get(f"grains.{NAME}.region") == "at" else scene):
-            settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
+            settings = {**base, **beside(entry.name), entry.name: value}
             if scene == "parts":
                 settings = fitting_parts(settings, entries)
             if entry.name == "scene.name":
@@ -370,7 +345,7 @@ def default_of(name, entries):
 
 def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
-    return {entry.name: VARIED[entry.name] for entry in entries
+    return {entry.name: VARIED.get(entry.name) for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
             and entry.name.startswith(("scene.motion_", "motion.", "stage.", "load.", "sample.", *PARTS))
             and entry.condition
@@ -383,13 +358,35 @@ def values_of(entry, scene):
         return [value for value in entry.choices if value != OUTPUT.get(entry.name, entry.default)
                 and (entry.name, value) not in UNTRIED]
     key = f"{entry.name}@{scene}" if f"{entry.name}@{scene}" in VARIED else entry.name
-    if key not in VARIED:
-        raise ValueError(f"{entry.name} is a namelist entry without a value in VARIED of guard_cases.py: add one")
-    if VARIED[key] == entry.default:
+    group, _, number = key.partition(f".{NAME}.")
+    value = VARIED.get(key, VARIED.get(f"forces.{number}") if group in PAIRS else None)
+    if value is None and not elsewhere(entry):
+        raise ValueError(f"{entry.name} has no value in VARIED of guard_cases.py, and ELSEWHERE does not say where it "
+                         "is tried: add one")
+    if value == entry.default:
         raise ValueError(f"{entry.name} has its default as value in VARIED of guard_cases.py: give it another")
-    if VARIED[key] is None and entry.name not in ELSEWHERE:
-        raise ValueError(f"{entry.name} has no value in VARIED of guard_cases.py, and ELSEWHERE does not say why")
-    return [] if VARIED[key] is None else [VARIED[key]]
+    return [] if value is None else [value]
+
+
+def elsewhere(entry):
+    """Where an entry without a value is tried; empty: nowhere."""
+    if entry.name.startswith((f"source.{NAME}.", f"sink.{NAME}.")):
+        return "tests/ranks: scene flow"
+    if entry.condition and entry.condition[0] == "cell.obeys":
+        return "tests/ranks: scene yielding"
+    return ELSEWHERE.get(entry.name, "")
+
+
+def beside(name):
+    """What an entry needs beside it to have an effect."""
+    group, _, number = name.partition(f".{NAME}.")
+    if name in BESIDE or group not in PAIRS:
+        return BESIDE.get(name, {})
+    damping = {"forces.damping_coefficient": "0.1"} if number == "damping_coefficient" else {}
+    if group == "material":
+        return {"scene.material": NAME, **damping}
+    materials = f"{group}.{NAME}.materials"
+    return {"material.one.density": "1000", "scene.material": NAME, **damping, materials: VARIED[materials]}
 
 
 def finder_cases(entries):

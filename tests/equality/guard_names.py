@@ -101,10 +101,15 @@ PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "sce
                          "integrate.fraction": "integrate.safety_factor", "guards.passing": "guards.tunnelling",
                          "guards.relaxed_depth": "scene.remove_overlap",
                          "checkpoint.elapsed": "checkpoint.wall_interval",
+                         # Two entries became one of two values; `words` has those of the cases
+                         **{f"scene.{key}_{end}": f"scene.{key}" for key in ("corners", "long_axis")
+                            for end in ("min", "max")},
                          # The group in the drums of inputs
                          "scene.motion": "motion.turn.kind",
                          **{f"scene.motion_{key}": f"motion.turn.{key}" for key in (
                              "bodies", "pivot", "rate", "velocity", "amplitude", "frequency", "start", "ramp")}},
+                words={"scene.corners_min=3": "3, 12", "scene.corners_max=20": "7, 20",
+                       "scene.long_axis_min=9e-3": "9e-3, 11e-3", "scene.long_axis_max=15e-3": "8e-3, 15e-3"},
                 # The settings of a sample, as text; points and normals of contacts, and what follows from points
                 data={"sample/case/input": None, "trajectory/contacts/point": None, "trajectory/contacts/normal": None,
                       **{f"trajectory/series/{name}": None for name in (

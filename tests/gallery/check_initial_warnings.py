@@ -22,7 +22,7 @@ TRUE_WARNINGS = {
 DANGERS = (
     ("stack", ("integrate.safety_factor=258", "integrate.duration=10"), "is 2.58E+02 times the stable time step", 1),
     ("bed", ("integrate.safety_factor=258", "integrate.duration=10"), "is 2.58E+02 times the stable time step", 0),
-    ("bed", ("scene.short_axis=8", "scene.long_axis_min=8", "scene.long_axis_max=11"), "lengths are in metres", 0),
+    ("bed", ("scene.short_axis=8", "scene.long_axis=8, 11"), "lengths are in metres", 0),
     ("gas", ("scene.overlap=.true.", "scene.solid_fraction=0.9"), "deep contacts at the start: ", 0),
     ("gas", ("scene.speed=500",), "it may pass through other bodies undetected", 1),
     ("incline", ("scene.slope=1.047",), "'slope' in &scene is 1.047 degree; usual is >= 1.6: in radian?", 0),

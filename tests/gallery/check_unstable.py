@@ -57,7 +57,7 @@ def stop(program, path, folder, *settings):
 def stay_stable(program, path, folder):
     """Round grains, whose contacts span many edges, at the automatic step: no guard speaks."""
     for settings in (("forces.friction=none",), ("forces.law=area",)):
-        overrides = [f"output.folder={folder}", "scene.bodies=60", "scene.corners_min=64", "scene.corners_max=64",
+        overrides = [f"output.folder={folder}", "scene.bodies=60", "scene.corners=64, 64",
                      "integrate.duration=0.1", *settings]
         command = [program, "run", str(path), "--force"] + [word for each in overrides for word in ("--set", each)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)

@@ -57,8 +57,7 @@ def input_of(kind, boxes, number=0.3):
     """The resolved input of a run that makes a scene of a kind, as a sample records it."""
     scene, margin = (text.format(boxes=boxes, number=number) for text in ENTRIES[kind])
     slender = "slender" in scene
-    axes = {"short_axis": 5e-4 if slender else 8e-3, "long_axis_min": 25e-3 if slender else 8e-3,
-            "long_axis_max": 25e-3 if slender else 11e-3}
+    axes = {"short_axis": 5e-4 if slender else 8e-3, "long_axis": "25e-3, 25e-3" if slender else "8e-3, 11e-3"}
     entries = scene.replace(" slender", "").replace(" = ", "=").split()
     entries += [f"{name}={value}" for name, value in axes.items()]
     groups = {

@@ -168,6 +168,11 @@ def test_a_scene_that_is_made_otherwise_is_of_another_kind(kind, old, new):
     assert kind_of(settings_of(text.replace(old, new))) == OTHER
 
 
+def test_a_scene_of_an_earlier_revision_is_refused():
+    with pytest.raises(ResultError, match="`long_axis_max` in its &scene are the two values of `long_axis` today"):
+        kind_of(settings_of(input_of("rods", 1000).replace("long_axis = 25e-3, 25e-3", "long_axis_min = 25e-3")))
+
+
 @pytest.mark.parametrize("kind, rate, expected", [("drum", 0.25, "drum"), ("drum", 0.0, OTHER), ("bed", 0.25, OTHER)])
 def test_walls_of_which_one_turns_make_a_drum_and_no_bed(kind, rate, expected):
     text = input_of(kind, 1000).replace("rate = 0.25", "rate = 0.0")

@@ -4,6 +4,7 @@ A capability says what it adds to groups of the namelist. Grains fly about in a 
 periodic along x, or in a cell without walls.
 """
 
+import re
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -113,6 +114,39 @@ REFUSED = {
     ("compensated", "gear"): "accumulation",
     ("hunt_crossley", "materials"): "'restitution' in &material hard is not used",
 }
+
+#: Choices of the table of entries that no capability has: what they do beside others is what another one does
+LEFT_OUT = {
+    "cell.periodic=y": "x", "cell.obeys=x": "xy", "cell.obeys=y": "xy",
+    "motion.kind=rotation": "oscillation", "motion.kind=translation": "oscillation", "motion.kind=table": "oscillation",
+    "load.direction=x": "y", "load.direction=angle": "y",
+    "grains.shape=regular": "random", "grains.shape=rectangle": "random", "grains.shape=outline": "cross",
+    "grains.sizes=octaves": "log_normal", "grains.sizes=grading": "log_normal",
+    "forces.law=conservative": "polar", "forces.damping=matuttis_chen": "hunt_crossley", "forces.damping=none": "rate",
+    "forces.friction=none": "cundall_strack", "forces.turn_rate": "shake",
+    "forces.stiffness_over_pressure": "stiffness", "integrate.scheme=gear_3_20": "gear",
+}
+#: Groups that do not change what happens
+WITHOUT_EFFECT = ("boxes", "neighbours", "overlap", "guards", "bench")
+
+
+def choices(groups, rows):
+    """What the table of entries lets a scene switch on: groups, words, and numbers of &forces that are 0 or absent."""
+    yield from (group for group in groups if group not in WITHOUT_EFFECT)
+    for row in rows:
+        if row.type == "word" and (row.group in ("cell", "motion", "load", "forces", "integrate")
+                                   or (row.group, row.key) in (("grains", "shape"), ("grains", "sizes"))):
+            yield from (f"{row.group}.{row.key}={word}" for word in row.allowed.split() if word != row.default)
+        elif row.group == "forces" and not row.default.strip("0, "):
+            yield f"{row.group}.{row.key}"
+
+
+def switched_on(name):
+    """Groups, entries and words in the namelist of a capability."""
+    for group, entries in re.findall(r"&(\w+)(.*?) /\n", text((name,)), re.DOTALL):
+        yield group
+        for key, value in re.findall(r"(\w+) = ('\w+'|\S+)", entries):
+            yield from (f"{group}.{key}", f"{group}.{key}={value.strip(chr(39))}")
 
 
 def pairs():

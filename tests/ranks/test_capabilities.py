@@ -5,10 +5,12 @@ threads that a seed draws. `--full` tries every pair, more than once, and also w
 """
 
 import random
+import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
-from capabilities import CAPABILITIES, REFUSED, pairs, text
+from capabilities import CAPABILITIES, LEFT_OUT, REFUSED, choices, pairs, switched_on, text
 from runs import FINDERS, complaints, contents, count, differences, frames, interrupt, run, state_hash
 
 #: Seeds of the quick test, which takes each capability in some pairs, and of the full one, which takes all pairs
@@ -78,3 +80,13 @@ def test_what_does_not_go_together_is_refused(two, tmp_path):
 def test_the_quick_sample_leaves_no_capability_out():
     times = Counter(name for two in some_pairs(QUICK_SEED) for name in two)
     assert times.keys() == CAPABILITIES.keys()
+
+
+def test_no_choice_of_the_table_is_left_out():
+    config = Path(__file__).parents[2] / "src" / "config"
+    sys.path.insert(0, str(config))
+    from generator.table import read_table
+    table = read_table((config / "entries.txt").read_text(encoding="utf-8"))
+    tried = {choice for name in CAPABILITIES for choice in switched_on(name)}
+    missing = set(choices(*table)) - tried
+    assert missing == LEFT_OUT.keys(), missing ^ LEFT_OUT.keys()

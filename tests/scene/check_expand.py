@@ -16,7 +16,7 @@ SHORT = ("integrate.dt=1e-6", "integrate.duration=2e-5", "output.frame_interval=
 OTHERS = {
     "gas_of_sizes": "&scene name='gas' bodies=150 size_ratio=5 speed=0.5 solid_fraction=0.3 spin=10 moving_grains=20 /",
     "hopper_descending": "&scene name='hopper' bodies=100 opening=0.05 slope=37 width=0.21 speed=0.2 seed=0 "
-                         "order='descending' corners_min=3 corners_max=20 density=1000 /",
+                         "order='descending' corners=3,20 density=1000 /",
     "incline_moving": "&scene name='incline' width=0.02 height=0.01 slope=31 speed=0.3 density=3000 /",
     "drum_turning": "&scene name='drum' boxes=300 radius=0.2 speed=0.1 / &motion name='turn' kind='rotation' rate=2 /",
     "bed_packed": "&scene name='bed' bodies=700 packing='packing' /",

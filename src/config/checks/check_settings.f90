@@ -1,5 +1,6 @@
 !> Checks that involve two or more entries. The table of entries holds the checks of single entries.
 module polydem_check_settings
+   use polydem_check_shapes, only: check_ellipse
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: lp, wp
@@ -124,31 +125,24 @@ contains
       type(instance_t), intent(in) :: group
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (scene => settings%scene, longest => length_limit*settings%scene%long_axis_max, &
-                 most_corners => int(settings%scene%corners_max, lp))
-         call require(scene%corners_min <= scene%corners_max, &
-            'must not exceed', 'corners_min', 'corners_max', group, error)
-         call require(scene%short_axis <= scene%long_axis_min, &
-            'must not exceed', 'short_axis', 'long_axis_min', group, error)
-         call require(scene%long_axis_min <= scene%long_axis_max, &
-            'must not exceed', 'long_axis_min', 'long_axis_max', group, error)
+      associate (scene => settings%scene, longest => length_limit*settings%scene%long_axis(2), &
+                 most_corners => int(settings%scene%corners(2), lp))
+         call check_ellipse(scene, group, error)
          ! Lengths and numbers are 0 if their entries are not in use.
-         call require(scene%radius <= longest, too_long, 'radius', 'long_axis_max', group, error)
-         call require(scene%opening <= longest, too_long, 'opening', 'long_axis_max', group, error)
+         call require(scene%radius <= longest, too_long, 'radius', 'long_axis', group, error)
+         call require(scene%opening <= longest, too_long, 'opening', 'long_axis', group, error)
          call require(scene%width <= longest .or. all(scene%name /= grain_scenes), &
-            too_long, 'width', 'long_axis_max', group, error)
+            too_long, 'width', 'long_axis', group, error)
          call require(scene%width >= scene%short_axis .or. all(scene%name /= grain_scenes) .or. &
             .not. scene%width > 0.0_wp, too_small, 'width', 'short_axis', group, error)
          call require(scene%radius >= scene%short_axis .or. .not. scene%radius > 0.0_wp, &
             too_small, 'radius', 'short_axis', group, error)
-         call require(scene%long_axis_max <= slenderness_limit*scene%short_axis, &
-            too_slender, 'long_axis_max', 'short_axis', group, error)
          if (any(scene%name == block_scenes)) then
             call require(scene%width <= slenderness_limit*scene%height, too_slender, 'width', 'height', group, error)
             call require(scene%height <= slenderness_limit*scene%width, too_slender, 'height', 'width', group, error)
          end if
-         call require(scene%bodies*most_corners <= corner_limit, too_many, 'bodies', 'corners_max', group, error)
-         call require(scene%boxes*most_corners <= corner_limit, too_many, 'boxes', 'corners_max', group, error)
+         call require(scene%bodies*most_corners <= corner_limit, too_many, 'bodies', 'corners', group, error)
+         call require(scene%boxes*most_corners <= corner_limit, too_many, 'boxes', 'corners', group, error)
          call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', group, error)
          call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
             'above 1 cannot be combined with', 'size_ratio', 'packing', group, error)

@@ -1,11 +1,11 @@
 !> Checks of the groups &source and &sink: entries that depend on each other.
 module polydem_check_sources
    use polydem_blame_entry, only: blame
-   use polydem_check_parts, only: check_cross, check_grading, check_outlines
+   use polydem_check_shapes, only: check_shape
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: wp
-   use polydem_settings, only: settings_t, source_settings_t
+   use polydem_settings, only: settings_t
    implicit none
    private
    public :: check_sources
@@ -32,6 +32,9 @@ contains
             if (.not. source%rate > 0.0_wp .and. source%count == 0) call blame(instance, 'rate', &
                'is 0; give it, or give ''count'', for example count = 500', error)
             call check_shape(source, instance, error)
+            if (source%shape == 'outline' .and. source%outlines == '' .and. &
+                (size(source%outline) < 6 .or. modulo(size(source%outline), 2) == 1)) call blame(instance, 'outline', &
+               'needs x and y of at least three corners; for example 0, 0, 0.01, 0, 0.01, 0.01', error)
             do j = 1, k - 1
                associate (other => settings%source(j))
                   if (source%count > other%count .or. source%count == 0) cycle
@@ -59,32 +62,5 @@ contains
          end associate
       end if
    end subroutine check_sources
-
-   !> Check the shape of the bodies of a source, as `check_parts` checks that of grains.
-   pure subroutine check_shape(source, instance, error)
-      type(source_settings_t), intent(in) :: source
-      type(instance_t), intent(in) :: instance
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), parameter :: order = 'must be in ascending order: the smallest before the largest one'
-
-      if (source%corners(1) > source%corners(2)) call blame(instance, 'corners', order, error)
-      if (source%long_axis(1) > source%long_axis(2)) call blame(instance, 'long_axis', order, error)
-      if (source%diameter(1) > source%diameter(2)) call blame(instance, 'diameter', order, error)
-      if (source%angle(1) > source%angle(2)) call blame(instance, 'angle', order, error)
-      call check_outlines(source%shape, source%outline, source%outline_corners, source%outline_pieces, &
-                          source%outlines, instance, error)
-      if (source%shape == 'cross') call check_cross(source%width, source%arm, instance, error)
-      call check_grading(source%sizes, source%grading, instance, error)
-      if (source%shape == 'outline' .and. source%outlines == '' .and. &
-          (size(source%outline) < 6 .or. modulo(size(source%outline), 2) == 1)) call blame(instance, 'outline', &
-         'needs x and y of at least three corners; for example 0, 0, 0.01, 0, 0.01, 0.01', error)
-      if (source%shape == 'ellipse' .and. source%short_axis > source%long_axis(1)) call blame(instance, 'short_axis', &
-         'must not exceed the first value of ''long_axis''', error, 'long_axis')
-      if (source%shape == 'ellipse' .and. source%long_axis(2) > 1.0e6_wp*source%short_axis) call blame(instance, &
-         'long_axis', 'must not exceed 1e6 times ''short_axis''', error, 'short_axis')
-      if (source%shape == 'rectangle' .and. max(source%width, source%height) &
-          > 1.0e6_wp*min(source%width, source%height)) call blame(instance, 'width', &
-         'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
-   end subroutine check_shape
 
 end module polydem_check_sources

@@ -143,7 +143,7 @@ contains
             '), or lower bodies or size_ratio'
       else
          text = text//'loose grains, not for '//to_text(group%number)//'; enlarge the container ('//entries// &
-            '), or lower bodies or long_axis_max'
+            '), or lower bodies or long_axis'
       end if
    end function recipe_text
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import re
 
+from polydem_post.base.result_file import ResultError
+
 #: Boxes of which it is not recorded how they were made
 UNKNOWN = "unknown"
 
@@ -60,13 +62,23 @@ def number_in(settings: dict, entry: str, default: float = 0.0) -> float:
     return value if math.isfinite(value) else default
 
 
+def long_axes_in(settings: dict) -> tuple[float, float]:
+    """Smallest and largest long axis of the grains of a recipe [m]; zeros if they are not there."""
+    if "scene.long_axis_min" in settings:
+        raise ResultError("a sample is of an earlier revision: `long_axis_min` and `long_axis_max` in its &scene are "
+                          "the two values of `long_axis` today; run the bench again")
+    words = settings.get("scene.long_axis", "").split(",")
+    least, most = (words if len(words) == 2 else ("", ""))
+    return number_in({"axis": least}, "axis"), number_in({"axis": most}, "axis")
+
+
 def kind_of(settings: dict) -> str:
     """Kind of a scene: drum, bed, column, hopper, line, gas, sizes, rods, soft, range, worst, rest; OTHER; UNKNOWN."""
     name = settings.get("scene.name", "")
     if not name:
         return UNKNOWN
     if number_in(settings, "boxes.margin") > 0.0:
-        long = 2.0 * number_in(settings, "boxes.margin") >= LONG_RANGE * number_in(settings, "scene.long_axis_max")
+        long = 2.0 * number_in(settings, "boxes.margin") >= LONG_RANGE * long_axes_in(settings)[1]
         return "range" if name == "gas" and long else OTHER
     if name in ("hopper", "channel"):
         return {"hopper": "hopper", "channel": "line"}[name]
@@ -101,8 +113,7 @@ def _kind_of_gas(settings: dict) -> str:
         return "worst"
     if number_in(settings, "scene.moving_grains") > 0.0:
         return "rest"
-    slender = number_in(settings, "scene.long_axis_min") >= SLENDER * number_in(settings, "scene.short_axis", math.inf)
-    if slender:
+    if long_axes_in(settings)[0] >= SLENDER * number_in(settings, "scene.short_axis", math.inf):
         return "rods"
     if settings.get("scene.overlap", "").lower() in (".true.", "t"):
         return "soft" if number_in(settings, "scene.solid_fraction") >= 1.0 else OTHER
@@ -127,6 +138,6 @@ def _kind_of_bed(settings: dict) -> str:
     if number_in(settings, "output.trace_start") < SETTLED:
         return OTHER
     width = number_in(settings, "scene.width")
-    axes = [number_in(settings, f"scene.{name}") for name in ("short_axis", "long_axis_min", "long_axis_max")]
-    area = number_in(settings, "scene.bodies") * 0.25 * math.pi * axes[0] * 0.5 * (axes[1] + axes[2]) / COVERED
+    grain = 0.25 * math.pi * number_in(settings, "scene.short_axis") * 0.5 * sum(long_axes_in(settings))
+    area = number_in(settings, "scene.bodies") * grain / COVERED
     return "column" if width > 0.0 and area > TALL * width**2 else "bed"
