@@ -1,6 +1,7 @@
 !> The walls of a scene: which fixed bodies motions and loads drive, and the walls by name.
 module polydem_assign_walls
    use polydem_bodies, only: bodies_t
+   use polydem_driven, only: new_window
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion_file, only: read_motion_table
@@ -104,9 +105,7 @@ contains
                return
             end if
          end associate
-         motions(k) = prescribed(settings%motion(k))
-         motions(k)%stage = number_of_stage(settings, settings%motion(k)%stage)
-         if (motions(k)%stage > 0_ip) motions(k)%start = huge(1.0_wp)
+         motions(k) = prescribed(settings%motion(k), number_of_stage(settings, settings%motion(k)%stage))
          if (motions(k)%kind /= 'table') cycle
          allocate (motions(k)%table)
          call read_motion_table(settings, settings%motion(k), motions(k)%table, error)
@@ -152,8 +151,10 @@ contains
    end subroutine find_loaded
 
    !> Parameters of a motion; revolutions per second and hertz become radians per second
-   pure type(motion_t) function prescribed(motion)
+   pure type(motion_t) function prescribed(motion, stage)
       type(motion_settings_t), intent(in) :: motion
+      !> Number of its stage; 0: none
+      integer(ip), intent(in) :: stage
 
       prescribed%kind = motion%kind
       prescribed%pivot = motion%pivot
@@ -161,11 +162,8 @@ contains
       prescribed%velocity = motion%velocity
       prescribed%amplitude = motion%amplitude
       prescribed%frequency = 2.0_wp*pi*motion%frequency
-      prescribed%start = motion%start
-      prescribed%ramp = motion%ramp
-      if (.not. motion%end > 0.0_wp) return
-      prescribed%end = motion%end
-      prescribed%ramp_down = motion%ramp
+      prescribed%window_t = new_window(motion%start, motion%end, motion%ramp, stage)
+      if (motion%end > 0.0_wp) prescribed%ramp_down = motion%ramp
    end function prescribed
 
    !> Identifiers of the bodies that a motion moves; none if it moves all fixed bodies

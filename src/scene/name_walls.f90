@@ -1,6 +1,7 @@
 !> Named walls and the loads on them, from the settings.
 module polydem_name_walls
    use polydem_bodies, only: bodies_t
+   use polydem_driven, only: new_window
    use polydem_kinds, only: ip, wp
    use polydem_named_walls, only: named_walls_t
    use polydem_run_duration, only: number_of_stage
@@ -106,11 +107,7 @@ contains
             load%mass = given%mass
             load%has_weight = given%weight
             load%damping_ratio = given%damping_ratio
-            load%start = given%start
-            if (given%end > 0.0_wp) load%end = given%end
-            load%stage = number_of_stage(settings, given%stage)
-            if (load%stage > 0_ip) load%start = huge(1.0_wp)
-            load%ramp = given%ramp
+            load%window_t = new_window(given%start, given%end, given%ramp, number_of_stage(settings, given%stage))
          end associate
       end do
    end subroutine assign_loads

@@ -1,13 +1,12 @@
 !> Prescribed motion of fixed bodies: rotation about a pivot, translation, oscillation, conveyor, table of poses.
 !>
-!> The displacement is a closed function of time, never a sum over steps. Every motion starts smoothly: during
-!> the ramp the rate rises as s(u) = u^2 (3 - 2 u) with u = (t - start)/ramp; the integral of s is u^3 - u^4/2.
-!> Before its end it slows down in the same way. From then on the bodies are at rest in their last pose, which
-!> follows from the time within the motion and therefore needs no memory.
+!> The displacement is a closed function of time, never a sum over steps. Every motion starts smoothly, and slows down
+!> in the same way before its end (`polydem_driven`).
 !>
 !> A conveyor gives the surface of bodies a velocity without moving them: friction and dampings see it.
 module polydem_prescribed_motion
    use polydem_bodies, only: bodies_t
+   use polydem_driven, only: ramp_t, window_t
    use polydem_elementary, only: sine_and_cosine
    use polydem_kinds, only: ip, wp
    use polydem_motion_table, only: evaluate_table, motion_table_t
@@ -16,7 +15,7 @@ module polydem_prescribed_motion
    public :: motion_t, pose_bodies, carry_bodies, starts_from_reference, turn_about
 
    !> Prescribed motion
-   type :: motion_t
+   type, extends(window_t) :: motion_t
       !> 'rotation', 'translation', 'oscillation', 'conveyor' or 'table', as in the namelist
       character(len=11) :: kind = ''
       !> Centre of the rotation, also of that of a table, (2) [m]
@@ -29,29 +28,9 @@ module polydem_prescribed_motion
       real(wp) :: amplitude(2) = 0.0_wp
       !> Angular frequency of an oscillation [rad/s]
       real(wp) :: frequency = 0.0_wp
-      !> Time at which the motion begins [s]
-      real(wp) :: start = 0.0_wp
-      !> Time from the start to the full rate [s]
-      real(wp) :: ramp = 0.0_wp
-      !> Time at which the motion ends [s]
-      real(wp) :: end = huge(1.0_wp)
-      !> Number of the stage of the run in which it acts, which sets start and end; 0: it depends on no stage
-      integer(ip) :: stage = 0_ip
-      !> Time before the end in which the motion slows down; 0 if the end was not known at the start [s]
-      real(wp) :: ramp_down = 0.0_wp
       !> Poses of a table
       type(motion_table_t), allocatable :: table
    end type motion_t
-
-   !> Ramp of a motion, which rises smoothly from rest to the full rate
-   type :: ramp_t
-      !> Integral of the factor from the start of the motion [s]
-      real(wp) :: elapsed = 0.0_wp
-      !> Fraction of the full rate
-      real(wp) :: factor = 0.0_wp
-      !> Derivative of the factor [1/s]
-      real(wp) :: growth = 0.0_wp
-   end type ramp_t
 
    !> Displacement along a vector: multiples of it that are displacement, velocity and acceleration
    type :: shift_t
@@ -80,7 +59,7 @@ contains
       type(shift_t) :: shift
       integer(ip) :: k
 
-      ramp = ramp_at(motion, time)
+      ramp = motion%ramp_at(time)
       if (motion%kind == 'rotation') then
          call rotate(motion, ramp, slots, position, angle, bodies)
          return
@@ -137,7 +116,7 @@ contains
          call follow_table(motion, time, slots, bodies)
          return
       end if
-      ramp = ramp_at(motion, time)
+      ramp = motion%ramp_at(time)
       if (motion%kind == 'rotation') then
          call rotate_further(motion%pivot, ramp_t(motion%rate*ramp%elapsed, motion%rate*ramp%factor, &
                                                   motion%rate*ramp%growth), slots, bodies)
@@ -255,38 +234,5 @@ contains
          shift = shift_t(motion%amplitude, s, rate*c, motion%frequency*ramp%growth*c - rate**2*s)
       end if
    end function shift_at
-
-   !> The ramp of a motion at a time
-   pure type(ramp_t) function ramp_at(motion, time) result(ramp)
-      type(motion_t), intent(in) :: motion
-      !> Time since the start of the run [s]
-      real(wp), intent(in) :: time
-      real(wp) :: u
-
-      if (time < motion%start) return
-      ramp = rise_at(motion, min(time, motion%end - motion%ramp_down))
-      if (time <= motion%end - motion%ramp_down .and. time < motion%end) return
-      u = 0.0_wp
-      if (motion%ramp_down > 0.0_wp) u = max(0.0_wp, (motion%end - time)/motion%ramp_down)
-      ramp = ramp_t(ramp%elapsed + motion%ramp_down*(0.5_wp - u*u*u*(1.0_wp - 0.5_wp*u)), &
-                    u*u*(3.0_wp - 2.0_wp*u), 0.0_wp)
-      if (u > 0.0_wp) ramp%growth = -6.0_wp*u*(1.0_wp - u)/motion%ramp_down
-   end function ramp_at
-
-   !> The ramp of a motion without an end
-   pure type(ramp_t) function rise_at(motion, time) result(ramp)
-      type(motion_t), intent(in) :: motion
-      !> Time since the start of the run, not before the start of the motion [s]
-      real(wp), intent(in) :: time
-      real(wp) :: u
-
-      if (time - motion%start >= motion%ramp) then
-         ramp = ramp_t(time - motion%start - 0.5_wp*motion%ramp, 1.0_wp, 0.0_wp)
-      else
-         u = (time - motion%start)/motion%ramp
-         ramp = ramp_t(motion%ramp*u*u*u*(1.0_wp - 0.5_wp*u), u*u*(3.0_wp - 2.0_wp*u), &
-                       6.0_wp*u*(1.0_wp - u)/motion%ramp)
-      end if
-   end function rise_at
 
 end module polydem_prescribed_motion

@@ -94,10 +94,10 @@ contains
             do axis = 1, 2
                if (.not. cell%load%yields(axis)) cycle
                text = text//'; obeys '//to_text(cell%load%stress(axis), 3)//' N/m2 along '//name(axis)
-               if (cell%load%damping > 0.0_wp) text = text//', closes at '// &
-                  to_text(cell%load%stress(axis)*cell%size(3 - axis)/cell%load%damping, 3)//' m/s'
+               if (cell%load%axis(axis)%damping > 0.0_wp) text = text//', closes at '// &
+                  to_text(cell%load%stress(axis)*cell%size(3 - axis)/cell%load%axis(axis)%damping, 3)//' m/s'
             end do
-            text = text//'; mass '//to_text(cell%load%mass, 3)//' kg/m'
+            text = text//'; mass '//to_text(cell%load%axis(1)%mass, 3)//' kg/m'
          end if
       end associate
       if (simulation%n_outside == 1_lp) text = text//'; 1 body outside was moved into it'

@@ -133,9 +133,9 @@ contains
       if (allocated(error) .or. .not. allocated(self%bodies%cell%load)) return
       associate (cell => self%bodies%cell)
          least = (least_steps*self%dt)**2*self%settings%forces%stiffness*maxval(cell%size)/minval(cell%size)
-         if (cell%load%mass >= least) return
+         if (cell%load%axis(1)%mass >= least) return
          call raise(error, input_error, place_of(self%settings, 'cell', 'mass')//': ''mass'' in &cell: the size '// &
-                    'of a cell of '//to_text(cell%load%mass)//' kg/m oscillates faster than the time step '// &
+                    'of a cell of '//to_text(cell%load%axis(1)%mass)//' kg/m oscillates faster than the time step '// &
                     'resolves; use at least '//to_text(short_number(least*1.1_wp))//' kg/m')
       end associate
    end subroutine check_cell_mass

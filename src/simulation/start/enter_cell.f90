@@ -3,6 +3,7 @@ module polydem_enter_cell
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_bodies_in_cell, only: add_profile, find_folds, put_into_cell, set_cell
    use polydem_cell, only: cell_t, new_cell
+   use polydem_driven, only: new_window
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
@@ -95,7 +96,7 @@ contains
       call put_into_cell(bodies, slots)
       if (.not. settings%profile) return
       associate (cell => bodies%cell)
-         rate = merge(0.0_wp, cell%rate, cell%ramp > 0.0_wp)
+         rate = merge(0.0_wp, cell%rate, cell%window%ramp > 0.0_wp)
          if (abs(rate*cell%size(2) - cell%former_jump) > 0.0_wp) &
             call add_profile(bodies, rate - cell%former_jump/cell%size(2), slots)
       end associate
@@ -113,12 +114,11 @@ contains
             load%yields(axis) = scan(given%obeys, 'xy'(axis:axis)) > 0
          end do
          load%stress = given%stress
-         load%ramp = given%stress_ramp
-         load%mass = given%mass
-         load%damping_ratio = given%damping_ratio
+         load%axis%window_t = new_window(0.0_wp, 0.0_wp, given%stress_ramp, number_of_stage(settings, given%stage))
+         load%axis%mass = given%mass
+         load%axis%damping_ratio = given%damping_ratio
+         load%axis%place = cell%size
          load%centre = cell%low + 0.5_wp*cell%size
-         load%stage = number_of_stage(settings, given%stage)
-         if (load%stage > 0_ip) load%start = huge(1.0_wp)
       end associate
    end subroutine let_yield
 
