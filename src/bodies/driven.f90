@@ -1,5 +1,5 @@
-!> What drives walls and cells: a window of time with a ramp, in which a velocity is given, and a degree of freedom that a
-!> force accelerates in such a window.
+!> What drives walls and cells: a window of time with a ramp, in which a velocity is given, and a degree of freedom that
+!> a force accelerates in such a window.
 !>
 !> A ramp rises smoothly from 0 to 1 as s(u) = u^2 (3 - 2 u) with u = (t - start)/ramp; the integral of s is
 !> u^3 - u^4/2. Before the end it may fall in the same way. From then on a velocity is 0 and the displacement the last
@@ -12,7 +12,10 @@ module polydem_driven
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: window_t, ramp_t, driven_t, new_window
+   public :: window_t, ramp_t, driven_t, new_window, along_angle
+
+   !> Direction of a turn; 1 and 2 are x and y
+   integer, parameter :: along_angle = 3
 
    !> Window of time
    type :: window_t

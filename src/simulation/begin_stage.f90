@@ -85,7 +85,7 @@ contains
                                     self%bodies%n)
       do j = 1, size(self%walls%driven)
          do k = 1, size(self%walls%driven(j)%motions)
-            call set_window(self%stages, self%dt, self%walls%driven(j)%motions(k))
+            call set_window(self%stages, self%dt, self%walls%driven(j)%motions(k)%motion)
          end do
       end do
       if (allocated(self%bodies%cell%load)) call set_window(self%stages, self%dt, self%bodies%cell%load%axis)

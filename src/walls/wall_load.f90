@@ -10,24 +10,22 @@
 module polydem_wall_load
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_driven, only: driven_t, ramp_t
+   use polydem_driven, only: along_angle, driven_t, ramp_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
    use polydem_kinds, only: ip, wp
+   use polydem_motion, only: turn_about
    use polydem_named_values, only: named_values_t
    use polydem_named_walls, only: named_walls_t
-   use polydem_prescribed_motion, only: turn_about
    use polydem_serializer, only: serializer_t
    use polydem_wall_record, only: force_about
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: wall_load_t, along_angle, of_load, of_damping, of_contacts, of_kinetic, n_energies
+   public :: wall_load_t, of_load, of_damping, of_contacts, of_kinetic, n_energies
    public :: set_masses, predict_loads, carry_walls, correct_loads, energies_of_loads, serialize_loads, set_load_columns
    public :: wall_mobilities
 
-   !> Direction of a turn; 1 and 2 are x and y
-   integer, parameter :: along_angle = 3
    !> Energies of a load: its work, that of the damping of its wall and that of the contacts on it, then the kinetic
    !> energy of the wall
    integer, parameter :: of_load = 1, of_damping = 2, of_contacts = 3, of_kinetic = 4, n_energies = 4
@@ -113,7 +111,7 @@ contains
       do k = 1, size(loads)
          associate (load => loads(k), slots => walls%wall(loads(k)%wall)%slots)
             if (load%direction == along_angle) then
-               call turn_about(load%pivot, load%place, load%speed, load%change, slots, bodies)
+               call turn_about(load%pivot, [load%place, load%speed, load%change], slots, bodies)
                cycle
             end if
             do j = 1, size(slots)

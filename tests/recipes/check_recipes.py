@@ -1,4 +1,4 @@
-"""Build and run the recipes of src/recipes.md: a force part, a finder, a force on bodies and a guard.
+"""Build and run the recipes of src/recipes.md, and compare the number of files that each touches with its limit.
 
 usage: check_recipes.py ROOT BUILD NINJA
 
@@ -16,18 +16,46 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 
-#: The files that the guide adds
+#: The files that the guide adds, and the sources
 EXAMPLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "examples")
-#: Files that each recipe changes: the list of CMake, the table of namelist entries, and the factory
-CHANGED = {
-    "src/contacts/forces/damping/walton_braun.f90": {"src/contacts/forces/law_factory.f90",
-                                                     "src/contacts/forces/CMakeLists.txt", "src/config/entries.txt"},
-    "src/neighbours/finders/plain_loop.f90": {"src/neighbours/finders/finder_factory.f90",
-                                              "src/neighbours/finders/CMakeLists.txt", "src/config/entries.txt"},
-    "src/contacts/fields/magnus_force.f90": {"src/contacts/fields/body_forces.f90",
-                                             "src/contacts/fields/CMakeLists.txt"},
-    "src/simulation/guards/spin_guard.f90": {"src/simulation/guards/guard_list.f90", "src/simulation/CMakeLists.txt"}}
+SOURCES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "src")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a kind of feature costs: its own file, its factory, and the most files that it may touch.
+
+    The list of CMake and the table of namelist entries, from which sources are made, do not count.
+    """
+
+    what: str
+    #: The file that is added, and the factory that gets its lines
+    path: str
+    factory: str
+    #: Whether the table of entries gets a word
+    has_entry: bool
+    most: int
+
+    def changed(self):
+        """Files that the recipe changes."""
+        layer = self.factory.split("/")[:3]
+        while not os.path.exists(os.path.join(SOURCES, *layer[1:], "CMakeLists.txt")):
+            layer.pop()
+        table = {"src/config/entries.txt"} if self.has_entry else set()
+        return {self.factory, "/".join((*layer, "CMakeLists.txt"))} | table
+
+
+RECIPES = (
+    Recipe("a neighbour finder", "src/neighbours/finders/plain_loop.f90", "src/neighbours/finders/finder_factory.f90",
+           True, 2),
+    Recipe("a force part", "src/contacts/forces/damping/walton_braun.f90", "src/contacts/forces/law_factory.f90",
+           True, 2),
+    Recipe("a force on bodies", "src/contacts/fields/magnus_force.f90", "src/contacts/fields/body_forces.f90",
+           False, 2),
+    Recipe("a motion of walls", "src/walls/motions/orbit.f90", "src/walls/motions/motion_factory.f90", True, 2),
+    Recipe("a guard", "src/simulation/guards/spin_guard.f90", "src/simulation/guards/guard_list.f90", False, 2))
 
 
 class RecipeError(Exception):
@@ -79,8 +107,15 @@ def apply_recipes(root, copy):
         found[new].add(path)
         with open(target, "w", encoding="utf-8") as source:
             source.write(content)
-    if found != CHANGED:
-        raise RecipeError(f"the recipes change {found} instead of {CHANGED}")
+    wanted = {recipe.path: recipe.changed() for recipe in RECIPES}
+    if found != wanted:
+        raise RecipeError(f"the recipes change {found} instead of {wanted}")
+    for recipe in RECIPES:
+        files = {recipe.path, *found[recipe.path]}
+        counted = sum(os.path.basename(name) not in ("CMakeLists.txt", "entries.txt") for name in files)
+        print(f"{recipe.what}: {counted} files")
+        if counted > recipe.most:
+            raise RecipeError(f"{recipe.what} touches {counted} files; at most {recipe.most} are allowed")
 
 
 def commands_of(build):
@@ -112,16 +147,9 @@ def build_program(root, copy, build, ninja, folder):
     subprocess.run([sys.executable, os.path.join(config, "make_entries.py"), os.path.join(config, "entries.txt"), made],
                    check=True)
     plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
-    forces, finders, fields, guards = (os.path.join(root, "src", name) for name in (
-        "contacts/forces/law_factory.f90", "neighbours/finders/finder_factory.f90", "contacts/fields/body_forces.f90",
-        "simulation/guards/guard_list.f90"))
-    for name, like in (("contacts/forces/damping/walton_braun.f90", forces),
-                       ("contacts/forces/law_factory.f90", forces),
-                       ("neighbours/finders/plain_loop.f90", finders),
-                       ("neighbours/finders/finder_factory.f90", finders),
-                       ("contacts/fields/magnus_force.f90", fields), ("contacts/fields/body_forces.f90", fields),
-                       ("simulation/guards/spin_guard.f90", guards), ("simulation/guards/guard_list.f90", guards)):
-        plan.append((os.path.join(copy, "src", name), like))
+    for recipe in RECIPES:
+        like = os.path.join(root, recipe.factory)
+        plan += [(os.path.join(copy, recipe.path), like), (os.path.join(copy, recipe.factory), like)]
     trial = os.path.join(root, "tests", "verification", "trial.f90")
     serial = os.path.join(root, "tests", "simulation", "serial_simulation.f90")
     plan += [(serial, trial), (trial, trial), (os.path.join(root, "tests", "recipes", "try_recipes.f90"), trial)]
@@ -160,6 +188,8 @@ def judge(text):
     turned, work = (float(word) for word in values["magnus"].split())
     if abs(turned - 0.5 * 3.0 * 0.4) > 1e-5 or abs(work) > 1e-5:
         raise RecipeError("the force on bodies of the recipe does not turn the velocity with its rate, or does work")
+    if max(abs(float(word)) for word in values["orbit"].split()) > 1e-12:
+        raise RecipeError("the motion of the recipe does not lead to the point of its circle")
     if values["spin_warnings"].split() != ["0", "3"]:
         raise RecipeError("the guard of the recipe does not warn at the checks of steps 0, 100 and 200")
 
@@ -180,7 +210,7 @@ def main(root, build, ninja):
         except RecipeError as error:
             print(f"recipes: {error}")
             return 1
-    print(f"recipes: all four work; {time.monotonic() - began:.0f} s")
+    print(f"recipes: all {len(RECIPES)} work; {time.monotonic() - began:.0f} s")
     return 0
 
 

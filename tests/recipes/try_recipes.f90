@@ -1,4 +1,4 @@
-!> Runs the example force part, finder, force on bodies and guard of the recipes; check_recipes.py checks the output.
+!> Runs the examples of the recipes; check_recipes.py checks the output.
 program try_recipes
    use trial, only: begin, block_at, steps
    use polydem_bodies, only: state_hash
@@ -25,6 +25,7 @@ program try_recipes
    call run_gas('all_pairs')
    call run_gas('plain_loop')
    call turn()
+   call go_round()
    call spin()
 
 contains
@@ -114,6 +115,29 @@ contains
          print '(a, 2es24.16)', 'magnus', atan2(v(2), v(1)), sum(v**2) - 1.0_wp
       end associate
    end subroutine turn
+
+   !> Move a wall by three eighths of a circle; print how far its centre is from where it should be, over the radius.
+   subroutine go_round()
+      character(len=*), parameter :: text = '&grains name = ''g'' region = ''at'' at = 0, 1 / &wall name = ''w'' '// &
+         'outline = ''rectangle'' low = -1, -1 high = 1, 0 / &motion name = ''m'' wall = ''w'' kind = ''orbit'' '// &
+         'amplitude = 0.5, 0 frequency = 2 / &forces gravity = 0, 0 / &integrate duration = 1 dt = 1e-4 /'
+      character(len=1) :: no_overrides(0)
+      real(wp), parameter :: root = sqrt(0.5_wp)
+      type(settings_t) :: settings
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+
+      call read_settings_text('orbit.nml', text, no_overrides, settings, error)
+      if (failed(error)) return
+      call new_simulation(settings, simulation, error)
+      if (failed(error)) return
+      call steps(simulation, 1875, error)
+      if (failed(error)) return
+      associate (slots => simulation%walls%driven(1)%slots)
+         print '(a, 2es24.16)', 'orbit', (simulation%bodies%position(:, slots(1)) &
+                                          - ([0.0_wp, -0.5_wp] + 0.5_wp*[-root - 1.0_wp, root]))/0.5_wp
+      end associate
+   end subroutine go_round
 
    !> Print the warnings of the example guard about a body that spins slowly, and about one that spins fast.
    subroutine spin()

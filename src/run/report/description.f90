@@ -13,7 +13,7 @@ module polydem_description
    use polydem_run_duration, only: longest_run
    use polydem_rigidity, only: describe_rigidity
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text, counted, join
+   use polydem_strings, only: to_text, counted
    use polydem_scene_measures, only: scene_measures_t
    implicit none
    private
@@ -283,15 +283,18 @@ contains
    !> Kinds of the motions and number of bodies of each wall that moves or yields
    function motion_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation
-      character(len=:), allocatable :: text
-      integer :: k
+      character(len=:), allocatable :: text, kinds
+      integer :: j, k
 
       text = ''
       do k = 1, size(simulation%walls%driven)
          associate (wall => simulation%walls%driven(k))
-            text = text//', '//join(wall%motions%kind, ' and ')
-            if (wall%is_loaded .and. size(wall%motions) > 0) text = text//' and '
-            if (wall%is_loaded) text = text//'yielding'
+            kinds = ''
+            do j = 1, size(wall%motions)
+               kinds = kinds//' and '//wall%motions(j)%motion%kind
+            end do
+            if (wall%is_loaded) kinds = kinds//' and yielding'
+            text = text//', '//kinds(len(' and ') + 1:)
             text = text//' of '//counted(size(wall%slots, kind=lp), 'wall')
          end associate
       end do

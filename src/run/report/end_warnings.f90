@@ -1,12 +1,12 @@
 !> Warnings at the end of a run: of what the input asked for and the run did not give.
 module polydem_end_warnings
+   use polydem_driven, only: along_angle
    use polydem_end_condition, only: ended_at_once
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
    use polydem_source, only: source_t
    use polydem_strings, only: to_text
-   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: write_end_warnings, warn_of_end

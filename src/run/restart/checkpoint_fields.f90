@@ -25,7 +25,7 @@ module polydem_checkpoint_fields
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t, time_of
    use polydem_vanishing_walls, only: find_release
-   use polydem_wall, only: has_table, hash_of_tables
+   use polydem_wall, only: hash_of_tables
    use polydem_wall_load, only: serialize_loads
    implicit none
    private
@@ -96,6 +96,7 @@ contains
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
       real(wp) :: shift, jump
+      integer(lp), allocatable :: tables(:)
       integer :: k
 
       call serialize_progress(serializer, simulation%step, attempts)
@@ -105,8 +106,9 @@ contains
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
          associate (driven => s%walls%driven)
-            if (any([(has_table(driven(k)), k=1, size(driven))])) call serializer%match('/run/motion_tables', &
-               [(hash_of_tables(driven(k)), k=1, size(driven))], '1', 'hash of the tables of motions')
+            tables = [(hash_of_tables(driven(k)), k=1, size(driven))]
+            if (any(tables /= 0_lp)) call serializer%match('/run/motion_tables', tables, '1', &
+                                                           'hash of the tables of motions')
          end associate
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
