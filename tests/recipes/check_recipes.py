@@ -1,8 +1,8 @@
-"""Build and run the recipes of src/recipes.md, and compare the number of files that each touches with its limit.
+"""Build and run the recipes of src, and compare the number of files that each touches with its limit.
 
 usage: check_recipes.py ROOT BUILD NINJA
 
-In a copy of src, each file of the folder examples goes to the place of the same name that the guide says, and diff
+In a copy of src, each file of the folder examples goes to the place of the same name that the pages say, and diff
 blocks change the last file named before them. The changed files are compiled with the flags of BUILD against its
 modules, linked before its libraries, and run by try_recipes.f90. All output goes to a temporary folder.
 """
@@ -16,46 +16,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 
-#: The files that the guide adds, and the sources
+#: The files that the guide adds
 EXAMPLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "examples")
-SOURCES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "src")
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """What a kind of feature costs: its own file, its factory, and the most files that it may touch.
-
-    The list of CMake and the table of namelist entries, from which sources are made, do not count.
-    """
-
-    what: str
-    #: The file that is added, and the factory that gets its lines
-    path: str
-    factory: str
-    #: Whether the table of entries gets a word
-    has_entry: bool
-    most: int
-
-    def changed(self):
-        """Files that the recipe changes."""
-        layer = self.factory.split("/")[:3]
-        while not os.path.exists(os.path.join(SOURCES, *layer[1:], "CMakeLists.txt")):
-            layer.pop()
-        table = {"src/config/entries.txt"} if self.has_entry else set()
-        return {self.factory, "/".join((*layer, "CMakeLists.txt"))} | table
-
-
-RECIPES = (
-    Recipe("a neighbour finder", "src/neighbours/finders/plain_loop.f90", "src/neighbours/finders/finder_factory.f90",
-           True, 2),
-    Recipe("a force part", "src/contacts/forces/damping/walton_braun.f90", "src/contacts/forces/law_factory.f90",
-           True, 2),
-    Recipe("a force on bodies", "src/contacts/fields/magnus_force.f90", "src/contacts/fields/body_forces.f90",
-           False, 2),
-    Recipe("a motion of walls", "src/walls/motions/orbit.f90", "src/walls/motions/motion_factory.f90", True, 2),
-    Recipe("a guard", "src/simulation/guards/spin_guard.f90", "src/simulation/guards/guard_list.f90", False, 2))
+#: Pages with recipes
+PAGES = ("recipes.md", "recipes_scenes.md")
+#: The most files that each recipe may touch; the list of CMake and the table of entries, from which sources are made, do
+#: not count
+MOST = {"A neighbour finder": 2, "A force part": 2, "A force on bodies": 2, "A motion of walls": 2, "A guard": 2,
+        "An integrator": 2, "A quantity of the series": 2, "A condition that ends a stage": 2, "A shape of grains": 2}
 
 
 class RecipeError(Exception):
@@ -63,20 +32,22 @@ class RecipeError(Exception):
 
 
 def blocks_of(text):
-    """The examples and diff blocks of a page, as (path, lines of the diff); no lines for an example."""
-    path, lines = None, None
+    """The examples and diff blocks of a page, as (heading, path, lines of the diff); no lines for an example."""
+    heading, path, lines = None, None, None
     for line in text.split("\n"):
         if lines is not None and line.startswith("```"):
-            yield path, lines
+            yield heading, path, lines
             lines = None
         elif lines is not None:
             lines.append(line)
+        elif line.startswith("## "):
+            heading = line[3:]
         elif line == "```diff":
             lines = []
         else:
             for path in re.findall(r"`(src/[\w/.]+)`", line):
                 if os.path.exists(os.path.join(EXAMPLES, os.path.basename(path))):
-                    yield path, None
+                    yield heading, path, None
 
 
 def changed(text, lines):
@@ -89,33 +60,33 @@ def changed(text, lines):
 
 
 def apply_recipes(root, copy):
-    """Apply the recipes of the guide to a copy of the sources, and check which files each of them changes."""
-    found, new = {}, None
-    with open(os.path.join(root, "src", "recipes.md"), encoding="utf-8") as page:
-        text = page.read()
-    for path, lines in blocks_of(text):
-        target = os.path.join(copy, path)
-        if lines is None:
-            if os.path.exists(target):
-                raise RecipeError(f"{path} exists already")
-            shutil.copy(os.path.join(EXAMPLES, os.path.basename(path)), target)
-            new = path
-            found[new] = set()
-            continue
-        with open(target, encoding="utf-8") as source:
-            content = changed(source.read(), lines)
-        found[new].add(path)
-        with open(target, "w", encoding="utf-8") as source:
-            source.write(content)
-    wanted = {recipe.path: recipe.changed() for recipe in RECIPES}
-    if found != wanted:
-        raise RecipeError(f"the recipes change {found} instead of {wanted}")
-    for recipe in RECIPES:
-        files = {recipe.path, *found[recipe.path]}
-        counted = sum(os.path.basename(name) not in ("CMakeLists.txt", "entries.txt") for name in files)
-        print(f"{recipe.what}: {counted} files")
-        if counted > recipe.most:
-            raise RecipeError(f"{recipe.what} touches {counted} files; at most {recipe.most} are allowed")
+    """Apply the recipes of the pages to a copy of the sources; return the files that each of them touches."""
+    found = {}
+    for page in PAGES:
+        with open(os.path.join(root, "src", page), encoding="utf-8") as stream:
+            text = stream.read()
+        for heading, path, lines in blocks_of(text):
+            target = os.path.join(copy, path)
+            files = found.setdefault(heading, [])
+            if path not in files:
+                files.append(path)
+            if lines is None:
+                if os.path.exists(target):
+                    raise RecipeError(f"{path} exists already")
+                shutil.copy(os.path.join(EXAMPLES, os.path.basename(path)), target)
+                continue
+            with open(target, encoding="utf-8") as source:
+                content = changed(source.read(), lines)
+            with open(target, "w", encoding="utf-8") as source:
+                source.write(content)
+    if set(found) != set(MOST):
+        raise RecipeError(f"the pages have the recipes {sorted(found)} instead of {sorted(MOST)}")
+    touched = {heading: [path for path in files if path.endswith(".f90")] for heading, files in found.items()}
+    for heading, files in touched.items():
+        print(f"{heading}: {len(files)} files")
+        if len(files) > MOST[heading]:
+            raise RecipeError(f"{heading} touches {files}; at most {MOST[heading]} files are allowed")
+    return touched
 
 
 def commands_of(build):
@@ -137,8 +108,8 @@ def compile_file(source, like, commands, modules, folder):
     return target
 
 
-def build_program(root, copy, build, ninja, folder):
-    """Compile the files that the recipes change, and link them with the libraries of the build."""
+def build_program(root, touched, copy, build, ninja, folder):
+    """Compile the files that the recipes touch, and link them with the libraries of the build."""
     commands = commands_of(build)
     modules = os.path.join(folder, "modules")
     os.mkdir(modules)
@@ -147,9 +118,11 @@ def build_program(root, copy, build, ninja, folder):
     subprocess.run([sys.executable, os.path.join(config, "make_entries.py"), os.path.join(config, "entries.txt"), made],
                    check=True)
     plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
-    for recipe in RECIPES:
-        like = os.path.join(root, recipe.factory)
-        plan += [(os.path.join(copy, recipe.path), like), (os.path.join(copy, recipe.factory), like)]
+    for files in touched.values():
+        # New files before those that use them, with the flags of their layer
+        known = [path for path in files if os.path.exists(os.path.join(root, path))]
+        for path in (*(path for path in files if path not in known), *known):
+            plan.append((os.path.join(copy, path), os.path.join(root, path if path in known else known[0])))
     trial = os.path.join(root, "tests", "verification", "trial.f90")
     serial = os.path.join(root, "tests", "simulation", "serial_simulation.f90")
     plan += [(serial, trial), (trial, trial), (os.path.join(root, "tests", "recipes", "try_recipes.f90"), trial)]
@@ -190,6 +163,12 @@ def judge(text):
         raise RecipeError("the force on bodies of the recipe does not turn the velocity with its rate, or does work")
     if max(abs(float(word)) for word in values["orbit"].split()) > 1e-12:
         raise RecipeError("the motion of the recipe does not lead to the point of its circle")
+    if abs(float(values["swing_order"]) - 1.0) > 0.1:
+        raise RecipeError("the integrator of the recipe is not of first order")
+    if values["greatest_speed"].split() != ["2.000", "2.000"]:
+        raise RecipeError("the quantity of the recipe is not the speed of the fastest body, or not that of the stage")
+    if abs(float(values["triangle_area"]) - 0.5) > 1e-12:
+        raise RecipeError("the shape of the recipe is no triangle")
     if values["spin_warnings"].split() != ["0", "3"]:
         raise RecipeError("the guard of the recipe does not warn at the checks of steps 0, 100 and 200")
 
@@ -201,8 +180,8 @@ def main(root, build, ninja):
         copy = os.path.join(folder, "copy")
         shutil.copytree(os.path.join(root, "src"), os.path.join(copy, "src"))
         try:
-            apply_recipes(root, copy)
-            program = build_program(root, copy, build, ninja, folder)
+            touched = apply_recipes(root, copy)
+            program = build_program(root, touched, copy, build, ninja, folder)
             done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=False)
             if done.returncode != 0:
                 raise RecipeError(f"the program ended with {done.returncode}:\n{done.stdout}{done.stderr}")
@@ -210,7 +189,7 @@ def main(root, build, ninja):
         except RecipeError as error:
             print(f"recipes: {error}")
             return 1
-    print(f"recipes: all {len(RECIPES)} work; {time.monotonic() - began:.0f} s")
+    print(f"recipes: all {len(MOST)} work; {time.monotonic() - began:.0f} s")
     return 0
 
 
