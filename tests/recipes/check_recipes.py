@@ -21,10 +21,11 @@ import time
 EXAMPLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "examples")
 #: Pages with recipes
 PAGES = ("recipes.md", "recipes_scenes.md")
-#: The most files that each recipe may touch; the list of CMake and the table of entries, from which sources are made, do
-#: not count
+#: The most files that each recipe may touch; the list of CMake and the table of entries, from which sources are made,
+#: do not count
 MOST = {"A neighbour finder": 2, "A force part": 2, "A force on bodies": 2, "A motion of walls": 2, "A guard": 2,
-        "An integrator": 2, "A quantity of the series": 2, "A condition that ends a stage": 2, "A shape of grains": 2}
+        "An integrator": 2, "A participant of the step": 2, "A quantity of the series": 2,
+        "A condition that ends a stage": 2, "A shape of grains": 2}
 
 
 class RecipeError(Exception):
@@ -121,8 +122,9 @@ def build_program(root, touched, copy, build, ninja, folder):
     for files in touched.values():
         # New files before those that use them, with the flags of their layer
         known = [path for path in files if os.path.exists(os.path.join(root, path))]
-        for path in (*(path for path in files if path not in known), *known):
-            plan.append((os.path.join(copy, path), os.path.join(root, path if path in known else known[0])))
+        new = [path for path in files if path not in known]
+        plan += [(os.path.join(copy, path), os.path.join(root, known[0])) for path in new]
+        plan += [(os.path.join(copy, path), os.path.join(root, path)) for path in known]
     trial = os.path.join(root, "tests", "verification", "trial.f90")
     serial = os.path.join(root, "tests", "simulation", "serial_simulation.f90")
     plan += [(serial, trial), (trial, trial), (os.path.join(root, "tests", "recipes", "try_recipes.f90"), trial)]
@@ -139,38 +141,41 @@ def build_program(root, touched, copy, build, ninja, folder):
     return program
 
 
+#: Values that the program prints, each with what it should be, the tolerance, and what is wrong otherwise. The area
+#: law is linear up to the depth over the size of the bodies, here some 1e-3
+WANTED = (
+    ("area_restitution", (0.5,), 5e-3, "area: the restitution is not 1/2"),
+    ("area_damping_work", (-0.75,), 1e-2, "area: damping does not dissipate 3/4 of the energy"),
+    ("conservative_restitution", (0.5,), 1e-3, "conservative: the restitution is not 1/2"),
+    ("conservative_damping_work", (-0.75,), 2e-3, "conservative: damping does not dissipate 3/4 of the energy"),
+    ("stable_step_share", (0.5,), 1e-12, "four times the stiffness does not halve the stable step"),
+    ("magnus", (0.5 * 3.0 * 0.4, 0.0), 1e-5,
+     "the force on bodies does not turn the velocity with its rate, or does work"),
+    ("orbit", (0.0, 0.0), 1e-12, "the motion does not lead to the point of its circle"),
+    ("euler_order", (1.0,), 0.1, "the integrator is not of first order"),
+    ("brake", ((1.0 - 1e-3) ** 400, 0.0), 1e-8,
+     "the participant does not slow the body down, or its balance does not close"),
+    ("greatest_speed", (2.0, 2.0), 2e-3,
+     "the quantity is not the speed of the fastest body, or not that of the stage"),
+    ("triangle_area", (0.5,), 1e-12, "the shape is no triangle"),
+    ("spin_warnings", (0, 3), 0.0, "the guard does not warn at the checks of steps 0, 100 and 200"))
+
+
 def judge(text):
-    """Compare the output of the program with the statements of the guide."""
+    """Compare the output of the program with the statements of the pages."""
     print(text, end="")
     values = dict(line.split(maxsplit=1) for line in text.strip().split("\n"))
     if "error" in values:
         raise RecipeError(values["error"])
+    for name, wanted, tolerance, wrong in WANTED:
+        found = [float(word) for word in values[name].split()]
+        if len(found) != len(wanted) or max(abs(x - y) for x, y in zip(found, wanted)) > tolerance:
+            raise RecipeError(wrong)
     for law in ("area", "conservative"):
-        # The area law is linear up to the depth over the size of the bodies, here some 1e-3.
-        tolerance = 5e-3 if law == "area" else 1e-3
-        if abs(float(values[f"{law}_restitution"]) - 0.5) > tolerance:
-            raise RecipeError(f"{law}: the restitution is not 1/2")
-        if abs(float(values[f"{law}_damping_work"]) + 0.75) > 2 * tolerance:
-            raise RecipeError(f"{law}: damping does not dissipate 3/4 of the energy")
         if not float(values[f"{law}_greatest_area"]) > 0.0:
             raise RecipeError(f"{law}: the greatest area is not stored")
-    if abs(float(values["stable_step_share"]) - 0.5) > 1e-12:
-        raise RecipeError("four times the stiffness does not halve the stable step")
     if values["plain_loop_result"] != values["all_pairs_result"]:
         raise RecipeError("the finder of the recipe does not give the bits of all_pairs")
-    turned, work = (float(word) for word in values["magnus"].split())
-    if abs(turned - 0.5 * 3.0 * 0.4) > 1e-5 or abs(work) > 1e-5:
-        raise RecipeError("the force on bodies of the recipe does not turn the velocity with its rate, or does work")
-    if max(abs(float(word)) for word in values["orbit"].split()) > 1e-12:
-        raise RecipeError("the motion of the recipe does not lead to the point of its circle")
-    if abs(float(values["swing_order"]) - 1.0) > 0.1:
-        raise RecipeError("the integrator of the recipe is not of first order")
-    if values["greatest_speed"].split() != ["2.000", "2.000"]:
-        raise RecipeError("the quantity of the recipe is not the speed of the fastest body, or not that of the stage")
-    if abs(float(values["triangle_area"]) - 0.5) > 1e-12:
-        raise RecipeError("the shape of the recipe is no triangle")
-    if values["spin_warnings"].split() != ["0", "3"]:
-        raise RecipeError("the guard of the recipe does not warn at the checks of steps 0, 100 and 200")
 
 
 def main(root, build, ninja):

@@ -31,6 +31,7 @@ program try_recipes
    call turn()
    call go_round()
    call fall()
+   call slow_down()
    call speed_up()
    call draw_triangle()
    call spin()
@@ -158,15 +159,31 @@ contains
       call list%append(block_at(0.0_wp, 0.0_wp, side, side, 0.0_wp))
       do k = 1, 2
          write (dt, '(es8.1)') 1.0e-3_wp/real(k, wp)
-         call begin('&forces gravity = 0, -10 / &integrate scheme = ''symplectic_euler'' duration = 1 dt = '//dt//' /', &
-                    list, simulation, error)
+         call begin('&forces gravity = 0, -10 / &integrate scheme = ''symplectic_euler'' duration = 1 dt = '// &
+                    dt//' /', list, simulation, error)
          if (failed(error)) return
          call steps(simulation, 100*k, error)
          if (failed(error)) return
          wrong(k) = simulation%bodies%position(2, 1) + 0.5_wp*10.0_wp*0.1_wp**2
       end do
-      print '(a, es24.16)', 'swing_order ', log(wrong(1)/wrong(2))/log(2.0_wp)
+      print '(a, es24.16)', 'euler_order ', log(wrong(1)/wrong(2))/log(2.0_wp)
    end subroutine fall
+
+   !> Print the speed that a brake leaves after 0.4 s, and the residual of the energy.
+   subroutine slow_down()
+      type(simulation_t) :: simulation
+      type(body_list_t) :: list
+      type(balance_t) :: balance
+      type(error_t), allocatable :: error
+
+      call list%append(block_at(0.0_wp, 0.0_wp, side, side, 0.0_wp), velocity=[1.0_wp, 0.0_wp])
+      call begin('&forces gravity = 0, 0 drag = 1e-9 / &integrate duration = 1 dt = 1e-3 /', list, simulation, error)
+      if (failed(error)) return
+      call steps(simulation, 400, error)
+      if (failed(error)) return
+      call compute_balance(simulation, balance)
+      print '(a, 2es24.16)', 'brake', simulation%bodies%velocity(1, 1), balance%energy_residual
+   end subroutine slow_down
 
    !> Print the greatest speed of two bodies as a column of the series, and as the quantity of a stage.
    subroutine speed_up()
@@ -184,7 +201,7 @@ contains
       if (failed(error)) return
       call measure_condition(simulation)
       call set_sample_columns(simulation, row)
-      print '(a, 2f6.3)', 'greatest_speed ', row%value(index_of('greatest_speed', row%name)), simulation%stages%value
+      print '(a, 2es24.16)', 'greatest_speed', row%value(index_of('greatest_speed', row%name)), simulation%stages%value
    end subroutine speed_up
 
    !> Print the area of a triangle.

@@ -2,7 +2,7 @@
 module polydem_motion_factory
    use polydem_conveyor, only: conveyor_t
    use polydem_driven, only: new_window
-   use polydem_errors, only: error_t
+   use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: wp
    use polydem_motion, only: motion_t
    use polydem_oscillation, only: oscillation_t
@@ -38,6 +38,9 @@ contains
          allocate (conveyor_t :: motion)
       case ('table')
          allocate (table_motion_t :: motion)
+      case default
+         call raise(error, input_error, 'there is no motion of the kind '//trim(given%kind))
+         return
       end select
       motion%kind = trim(given%kind)
       motion%pivot = given%pivot

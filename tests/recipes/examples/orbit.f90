@@ -1,5 +1,5 @@
-!> Motion of fixed bodies on a circle without a turn, as of an orbital shaker: x = x0 + a (cos(w e(t)) - 1, sin(w e(t))),
-!> with the ramped time e.
+!> Motion of fixed bodies on a circle without a turn, as of an orbital shaker: x = x0 + a (cos(w e(t)) - 1,
+!> sin(w e(t))), with the ramped time e.
 module polydem_orbit
    use polydem_driven, only: along_angle, ramp_t
    use polydem_elementary, only: sine_and_cosine, two_pi
