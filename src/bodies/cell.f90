@@ -10,6 +10,7 @@
 !>
 !> A cell that *yields* has a size that obeys a stress (`polydem_cell_load`).
 module polydem_cell
+   use polydem_driven, only: driven_t, ramp_t, window_t
    use polydem_kinds, only: ip, wp
    implicit none
    private
@@ -20,20 +21,14 @@ module polydem_cell
    type :: cell_load_t
       !> Whether the cell yields along an axis
       logical :: yields(2) = .false.
-      !> Stress that it obeys, positive in compression [N/m2], and time in which the stress grows [s]
-      real(wp) :: stress(2) = 0.0_wp, ramp = 0.0_wp
-      !> Mass [kg/m]; damping over the critical one, and its coefficient [kg/(m s)]
-      real(wp) :: mass = 0.0_wp, damping_ratio = 1.0_wp, damping = 0.0_wp
-      !> Times between which the cell yields [s]
-      real(wp) :: start = 0.0_wp, end = huge(1.0_wp)
-      !> Number of the stage of the run in which it yields, which sets start and end; 0: it depends on no stage
-      integer(ip) :: stage = 0_ip
+      !> Stress that it obeys, positive in compression [N/m2]
+      real(wp) :: stress(2) = 0.0_wp
+      !> The size along each axis, and the window in which it yields; both have the same mass and damping
+      type(driven_t) :: axis(2)
       !> Centre of the cell, which stays where it is [m]
       real(wp) :: centre(2) = 0.0_wp
       !> Least size for the largest body [m]
       real(wp) :: least = 0.0_wp
-      !> Velocity of the size [m/s], that in the middle of the step, and acceleration [m/s2]
-      real(wp) :: speed(2) = 0.0_wp, half(2) = 0.0_wp, change(2) = 0.0_wp
       !> Factor by which the size grows in this step
       real(wp) :: stretch(2) = 1.0_wp
       !> Unit of the sums over contacts of force times distance, a power of 2 [N]
@@ -55,8 +50,10 @@ module polydem_cell
       real(wp) :: inverse(2) = 0.0_wp
       !> Whether the cell is sheared
       logical :: is_sheared = .false.
-      !> Rate of the shear [1/s], and time in which it smoothly reaches this rate [s]
-      real(wp) :: rate = 0.0_wp, ramp = 0.0_wp
+      !> Rate of the shear [1/s]
+      real(wp) :: rate = 0.0_wp
+      !> The window in which it acts, from time 0 on
+      type(window_t) :: window
       !> Displacement of the copy above at time 0, that of the result from which the run starts [m]
       real(wp) :: first_shift = 0.0_wp
       !> Displacement of the copy above, from 0 to the width [m], and its velocity [m/s]
@@ -100,7 +97,7 @@ contains
       cell%first_shift = merge(first_shift, 0.0_wp, all(cell%size > 0.0_wp))
       cell%is_sheared = abs(rate) > 0.0_wp .or. abs(cell%first_shift) > 0.0_wp
       cell%rate = rate
-      cell%ramp = ramp
+      cell%window%ramp = ramp
       call shear_cell(cell, 0.0_wp, 0.0_wp)
    end function new_cell
 
@@ -157,34 +154,26 @@ contains
 
       associate (load => cell%load)
          former = cell%size
-         load%half = load%speed + 0.5_wp*dt*load%change
-         cell%size = former + dt*load%half
+         call load%axis%predict(dt)
+         cell%size = load%axis%place
          load%stretch = cell%size/former
-         load%speed = load%half + 0.5_wp*dt*load%change
          cell%low = load%centre - 0.5_wp*cell%size
          cell%inverse = 1.0_wp/cell%size
       end associate
    end subroutine grow_cell
 
-   !> Find displacement and velocity of the copy above at a time. During the ramp the rate rises as u^2 (3 - 2 u), as
-   !> that of prescribed motions.
+   !> Find displacement and velocity of the copy above at a time.
    elemental subroutine find_shear(cell, time, shift, jump)
       type(cell_t), intent(in) :: cell
       !> Simulated time [s]
       real(wp), intent(in) :: time
       !> Displacement [m] and velocity [m/s]
       real(wp), intent(out) :: shift, jump
-      real(wp) :: elapsed, factor, u
+      type(ramp_t) :: ramp
 
-      elapsed = time - 0.5_wp*cell%ramp
-      factor = 1.0_wp
-      if (time < cell%ramp) then
-         u = time/cell%ramp
-         elapsed = cell%ramp*u*u*u*(1.0_wp - 0.5_wp*u)
-         factor = u*u*(3.0_wp - 2.0_wp*u)
-      end if
-      jump = cell%rate*cell%size(2)*factor
-      shift = modulo(cell%first_shift + cell%rate*cell%size(2)*elapsed, cell%size(1))
+      ramp = cell%window%ramp_at(time)
+      jump = cell%rate*cell%size(2)*ramp%factor
+      shift = modulo(cell%first_shift + cell%rate*cell%size(2)*ramp%elapsed, cell%size(1))
    end subroutine find_shear
 
    !> The vector to the nearest copy of where a vector leads [m]

@@ -25,7 +25,7 @@ module polydem_namelist_entry
       !> (finite) value
       character(len=allowed_length) :: allowed
       !> Condition under which the entry is in use: 'key: word word' in the same group; blank: always
-      character(len=80) :: needs
+      character(len=160) :: needs
       !> Meaning in one sentence
       character(len=100) :: meaning
       !> Usual values of a real number, beyond which there is a warning, as alternatives such as '<= 5 or > 90'; those

@@ -3,12 +3,10 @@ module polydem_assign_walls
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_motion_file, only: read_motion_table
+   use polydem_motion, only: motion_item_t
+   use polydem_motion_factory, only: new_motion
    use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls
    use polydem_named_walls, only: named_walls_t
-   use polydem_outlines, only: pi
-   use polydem_prescribed_motion, only: motion_t
-   use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: text_t, to_text
@@ -90,7 +88,8 @@ contains
       integer(ip), allocatable :: slots(:), wall_of(:), first(:)
       ! Whether a motion, or a load behind the motions, moves a body, (motion or load, fixed body)
       logical, allocatable :: moves(:, :)
-      type(motion_t), allocatable :: motions(:)
+      type(motion_item_t), allocatable :: motions(:)
+      integer(ip), allocatable :: indices(:)
       integer(ip) :: k, n, n_motions, s, w
 
       slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
@@ -104,12 +103,7 @@ contains
                return
             end if
          end associate
-         motions(k) = prescribed(settings%motion(k))
-         motions(k)%stage = number_of_stage(settings, settings%motion(k)%stage)
-         if (motions(k)%stage > 0_ip) motions(k)%start = huge(1.0_wp)
-         if (motions(k)%kind /= 'table') cycle
-         allocate (motions(k)%table)
-         call read_motion_table(settings, settings%motion(k), motions(k)%table, error)
+         call new_motion(settings, settings%motion(k), motions(k)%motion, error)
          if (allocated(error)) return
       end do
       do k = 1_ip, size(settings%load, kind=ip)
@@ -131,7 +125,8 @@ contains
       end do
       allocate (walls(n))
       do w = 1_ip, n
-         call new_wall(walls(w), pack(motions, moves(:n_motions, first(w))), bodies, pack(slots, wall_of == w))
+         indices = pack([(k, k=1_ip, n_motions)], moves(:n_motions, first(w)))
+         call new_wall(walls(w), motions(indices), bodies, pack(slots, wall_of == w))
          walls(w)%is_loaded = any(moves(n_motions + 1:, first(w)))
       end do
    end subroutine assign_motions
@@ -150,23 +145,6 @@ contains
       if (allocated(error)) error%message = place_of(settings, 'wall.'//name, 'bodies')//": 'bodies' in &wall "// &
          name//': '//error%message
    end subroutine find_loaded
-
-   !> Parameters of a motion; revolutions per second and hertz become radians per second
-   pure type(motion_t) function prescribed(motion)
-      type(motion_settings_t), intent(in) :: motion
-
-      prescribed%kind = motion%kind
-      prescribed%pivot = motion%pivot
-      prescribed%rate = 2.0_wp*pi*motion%rate
-      prescribed%velocity = motion%velocity
-      prescribed%amplitude = motion%amplitude
-      prescribed%frequency = 2.0_wp*pi*motion%frequency
-      prescribed%start = motion%start
-      prescribed%ramp = motion%ramp
-      if (.not. motion%end > 0.0_wp) return
-      prescribed%end = motion%end
-      prescribed%ramp_down = motion%ramp
-   end function prescribed
 
    !> Identifiers of the bodies that a motion moves; none if it moves all fixed bodies
    pure function ids_of(motion, named) result(ids)

@@ -4,11 +4,11 @@
 !> prescribed rotation about the pivot (0, 0) turns the ring.
 module polydem_drum
    use polydem_arrange, only: loose_spacing
+   use polydem_elementary, only: pi
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: settled_area
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: row_height
-   use polydem_outlines, only: pi
    use polydem_parts, only: new_wall_part, parts_t
    use polydem_recipe, only: recipe_grains
    use polydem_settings, only: grains_settings_t, scene_settings_t, wall_settings_t

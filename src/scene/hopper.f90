@@ -3,12 +3,11 @@
 !> The opening is at y = 0. Each of the five walls is one polygon (Krengel et al. 2026, Fig. 7).
 module polydem_hopper
    use polydem_arrange, only: loose_spacing
-   use polydem_elementary, only: cosine, tangent
+   use polydem_elementary, only: cosine, tangent, pi
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: settled_area
    use polydem_kinds, only: wp
    use polydem_lattice, only: lattice_height
-   use polydem_outlines, only: pi
    use polydem_parts, only: parts_t
    use polydem_recipe, only: recipe_grains
    use polydem_settings, only: grains_settings_t, scene_settings_t

@@ -2,10 +2,10 @@
 !>
 !> The centre of the contact is at the origin at the start. The slope falls to the right and has a stop at each end.
 module polydem_incline
-   use polydem_elementary, only: cosine, sine
+   use polydem_elementary, only: cosine, sine, pi
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_outlines, only: pi, rectangle
+   use polydem_outlines, only: rectangle
    use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: new_grains, parts_t
    use polydem_settings, only: grains_settings_t, settings_t

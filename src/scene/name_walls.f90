@@ -1,6 +1,7 @@
 !> Named walls and the loads on them, from the settings.
 module polydem_name_walls
    use polydem_bodies, only: bodies_t
+   use polydem_driven, only: along_angle, new_window
    use polydem_kinds, only: ip, wp
    use polydem_named_walls, only: named_walls_t
    use polydem_run_duration, only: number_of_stage
@@ -8,7 +9,7 @@ module polydem_name_walls
    use polydem_strings, only: index_of
    use polydem_wall, only: wall_t
    use polydem_wall_bodies, only: wall_bodies_t
-   use polydem_wall_load, only: along_angle, wall_load_t
+   use polydem_wall_load, only: wall_load_t
    implicit none
    private
    public :: assign_loads, ids_of_wall, name_walls
@@ -36,8 +37,8 @@ contains
       end do
    end function number_of
 
-   !> List the walls by name. The torque on a wall is stated about the pivot of its first rotation, table or load by
-   !> angle, else about the origin.
+   !> List the walls by name. The torque on a wall is stated about the pivot of its first motion that has one, or load
+   !> by angle, else about the origin.
    subroutine name_walls(settings, bodies, of_parts, walls, named)
       type(settings_t), intent(in) :: settings
       !> Bodies at the start
@@ -71,8 +72,9 @@ contains
             do k = 1, size(walls)
                if (all(walls(k)%slots /= wall%slots(1))) cycle
                do j = size(walls(k)%motions), 1, -1
-                  if (any(walls(k)%motions(j)%kind == [character(len=8) :: 'rotation', 'table'])) &
-                     wall%pivot = walls(k)%motions(j)%pivot
+                  associate (motion => walls(k)%motions(j)%motion)
+                     if (motion%has_pivot()) wall%pivot = motion%pivot
+                  end associate
                end do
             end do
          end associate
@@ -106,11 +108,7 @@ contains
             load%mass = given%mass
             load%has_weight = given%weight
             load%damping_ratio = given%damping_ratio
-            load%start = given%start
-            if (given%end > 0.0_wp) load%end = given%end
-            load%stage = number_of_stage(settings, given%stage)
-            if (load%stage > 0_ip) load%start = huge(1.0_wp)
-            load%ramp = given%ramp
+            load%window_t = new_window(given%start, given%end, given%ramp, number_of_stage(settings, given%stage))
          end associate
       end do
    end subroutine assign_loads

@@ -4,6 +4,7 @@
 module polydem_begin_stage
    use polydem_bodies_in_cell, only: path_of
    use polydem_changed_gravity, only: change_gravity
+   use polydem_driven, only: window_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_run_duration, only: longest_stage
@@ -84,38 +85,28 @@ contains
                                     self%bodies%n)
       do j = 1, size(self%walls%driven)
          do k = 1, size(self%walls%driven(j)%motions)
-            associate (motion => self%walls%driven(j)%motions(k), stages => self%stages)
-               call set_window(stages, self%dt, motion%stage, motion%start, motion%end)
-            end associate
+            call set_window(self%stages, self%dt, self%walls%driven(j)%motions(k)%motion)
          end do
       end do
-      if (allocated(self%bodies%cell%load)) then
-         associate (load => self%bodies%cell%load)
-            call set_window(self%stages, self%dt, load%stage, load%start, load%end)
-         end associate
-      end if
+      if (allocated(self%bodies%cell%load)) call set_window(self%stages, self%dt, self%bodies%cell%load%axis)
       if (.not. allocated(self%walls%loads)) return
       do k = 1, size(self%walls%loads)
-         associate (load => self%walls%loads(k))
-            call set_window(self%stages, self%dt, load%stage, load%start, load%end)
-         end associate
+         call set_window(self%stages, self%dt, self%walls%loads(k))
       end do
    end subroutine use_parameters
 
-   !> Set the times at which a motion, a load or the cell begins and ends, as far as they are known.
-   pure subroutine set_window(stages, dt, stage, start, end)
+   !> Set the times at which a window opens and closes, as far as they are known.
+   elemental subroutine set_window(stages, dt, window)
       type(run_stages_t), intent(in) :: stages
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Number of the stage in which it acts; 0: it depends on no stage
-      integer(ip), intent(in) :: stage
-      !> The times [s]
-      real(wp), intent(inout) :: start, end
+      !> Window of a motion, a load or the cell
+      class(window_t), intent(inout) :: window
 
-      if (stage == 0_ip .or. stage > stages%number) return
-      start = real(stages%first(stage), wp)*dt
-      end = huge(1.0_wp)
-      if (stage < stages%number) end = real(stages%first(stage + 1_ip), wp)*dt
+      if (window%stage == 0_ip .or. window%stage > stages%number) return
+      window%start = real(stages%first(window%stage), wp)*dt
+      window%end = huge(1.0_wp)
+      if (window%stage < stages%number) window%end = real(stages%first(window%stage + 1_ip), wp)*dt
    end subroutine set_window
 
    !> Find the last step of the present stage, unless its condition has decided it, and of the run.

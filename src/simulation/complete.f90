@@ -45,7 +45,6 @@ contains
       if (n > 0_ip) done = self%bodies%free(n)
       call keep_fixed(done + 1_ip, self%bodies%n, self%loop%force_sums, self%bodies)
       if (allocated(self%energy_balance%power_sum)) call count_step(self%energy_balance)
-      call self%walls%accumulate(self%bodies, self%loop%walls)
       do k = n + 1_ip, self%n_moving
          good = good .and. move_within_limit(self%motion%check, self%bodies, self%moving(k), self%moving(k), self%dt)
       end do

@@ -8,21 +8,23 @@ module polydem_simulation
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: balance_t, energy_balance_t, evaluate_balance
+   use polydem_errors, only: error_t
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbour_search, only: neighbour_search_t
    use polydem_packed_history, only: packed_history_t
    use polydem_run_stages, only: run_stages_t
+   use polydem_serializer, only: serializer_t
    use polydem_series, only: series_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
    use polydem_traffic, only: traffic_t
-   use polydem_wall_energy, only: add_cell, add_loads
    use polydem_walls, only: walls_t
    use polydem_loop_results, only: loop_results_t
    implicit none
    private
-   public :: simulation_t, relaxation_t, former_direction, time_of, present_gravity, acts_on_all, compute_balance
+   public :: simulation_t, participant_t, participant_item_t, relaxation_t, former_direction
+   public :: time_of, present_gravity, acts_on_all, compute_balance
    public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: contacts, pairs that began, pairs that ended, contacts without direction
@@ -66,6 +68,28 @@ module polydem_simulation
       logical :: is_of_bodies = .false.
    end type static_pressure_t
 
+   !> What takes part in the steps of some runs beside bodies, contacts and integrator, such as loads, sources or a cell
+   !> that moves. All procedures do nothing by default, and all but `needs_table` are collective.
+   type, abstract :: participant_t
+      !> Whether it needs all ranks after the forces, so that they agree on errors before
+      logical :: needs_all_ranks = .false.
+   contains
+      procedure :: start => start_nothing
+      procedure :: change_bodies => change_nothing
+      procedure :: begin_step => begin_nothing
+      procedure :: needs_table => needs_no_table
+      procedure :: follow_forces => follow_nothing
+      procedure :: end_step => end_nothing
+      procedure :: serialize => serialize_nothing
+      procedure :: add_energies => add_nothing
+   end type participant_t
+
+   !> A participant of any kind
+   type :: participant_item_t
+      !> The participant
+      class(participant_t), allocatable :: participant
+   end type participant_item_t
+
    !> The complete state of a simulation on one rank
    type :: simulation_t
       !> Settings of the run; gravity and drag of the group &forces are those of the present stage
@@ -96,6 +120,11 @@ module polydem_simulation
       type(packed_history_t), allocatable :: received_history
       !> Force law
       type(force_law_t) :: law
+      !> What takes part in the steps beside all this, in the order in which it acts. While a participant acts, the list
+      !> is not here, so that it may change the simulation and itself
+      type(participant_item_t), allocatable :: participants(:)
+      !> Whether all ranks agree on errors of a step before it is completed
+      logical :: agrees_on_errors = .false.
       !> Forces on bodies that are no contacts
       type(body_forces_t) :: body_forces
       !> What moves the free bodies
@@ -164,13 +193,100 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Energy, momentum and their unexplained residuals
       type(balance_t), intent(out) :: balance
+      type(participant_item_t), allocatable :: list(:)
+      integer :: k
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
                             self%loop%force_sums, self%loop%walls, balance)
-      if (allocated(self%bodies%cell%load)) call add_cell( &
-         self%energy_balance, self%dt*(self%bodies%cell%load%power_sum - 0.5_wp*self%bodies%cell%load%power), &
-         self%loop%walls%energy_is_known, balance)
-      if (allocated(self%walls%loads)) call add_loads(self%energy_balance, self%walls%energies(self%dt), balance)
+      call move_alloc(self%participants, list)
+      do k = 1, size(list)
+         call list(k)%participant%add_energies(self, balance)
+      end do
+      call move_alloc(list, self%participants)
    end subroutine compute_balance
+
+   !> Start with the forces at time 0, or at the time of a restart.
+   subroutine start_nothing(self, simulation)
+      class(participant_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+   end subroutine start_nothing
+
+   !> Let bodies enter, leave or vanish between two steps.
+   subroutine change_nothing(self, simulation, error)
+      class(participant_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      !> Allocated if that fails, on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+      if (allocated(error)) return
+   end subroutine change_nothing
+
+   !> Begin a step, before bodies move.
+   subroutine begin_nothing(self, simulation, error)
+      class(participant_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      !> Allocated if the step is impossible, on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+      if (allocated(error)) return
+   end subroutine begin_nothing
+
+   !> Whether this step must keep the table of all contacts
+   pure logical function needs_no_table(self, simulation)
+      class(participant_t), intent(in) :: self
+      type(simulation_t), intent(in) :: simulation
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+      needs_no_table = .false.
+   end function needs_no_table
+
+   !> Act on the forces of a step, before the bodies get their final velocities.
+   subroutine follow_nothing(self, simulation, dt)
+      class(participant_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      !> Time step; 0 at the start of the run [s]
+      real(wp), intent(in) :: dt
+
+      associate (unused_self => self, unused_simulation => simulation, unused_dt => dt)
+      end associate
+   end subroutine follow_nothing
+
+   !> End a step, when all bodies have their final velocities.
+   subroutine end_nothing(self, simulation)
+      class(participant_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+   end subroutine end_nothing
+
+   !> Write what outlives a step to a checkpoint, or read it.
+   subroutine serialize_nothing(self, simulation, serializer)
+      class(participant_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      class(serializer_t), intent(inout) :: serializer
+
+      associate (unused_self => self, unused_simulation => simulation, unused_serializer => serializer)
+      end associate
+   end subroutine serialize_nothing
+
+   !> Add work and energy to the balance, whose residual becomes that of all.
+   subroutine add_nothing(self, simulation, balance)
+      class(participant_t), intent(in) :: self
+      !> The simulation; its `energy_balance` may change
+      type(simulation_t), intent(inout) :: simulation
+      type(balance_t), intent(inout) :: balance
+
+      associate (unused_self => self, unused_simulation => simulation, unused_balance => balance)
+      end associate
+   end subroutine add_nothing
 
 end module polydem_simulation

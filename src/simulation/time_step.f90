@@ -1,27 +1,24 @@
 !> The time step of a simulation.
 module polydem_time_step
    use polydem_bodies, only: turn_bodies
-   use polydem_bodies_in_cell, only: change_cell
    use polydem_box_images, only: place_images
    use polydem_box_maker, only: turn_and_bound
    use polydem_boxes_within, only: have_boxes_within
-   use polydem_cell_load, only: yield_cell
    use polydem_complete, only: complete_step
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_loop, only: loop_over_contacts
    use polydem_energy_balance, only: expire_balance
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_exchange_bodies, only: exchange_bodies
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_list, only: pair_list_t
+   use polydem_participants, only: begin_step, change_bodies, end_step, follow_forces, need_table
    use polydem_predict, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
-   use polydem_simulation, only: present_gravity, simulation_t, sum_began, sum_ended, time_of
+   use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
    use polydem_strings, only: to_text
    use polydem_timers, only: block_clock_t, stage_boxes, stage_decomposition, stage_forces, stage_integrate, &
       stage_neighbours, stage_overlap
-   use polydem_vanishing_walls, only: remove_walls
    use polydem_wall_terms, only: select_walls
    implicit none
    private
@@ -40,14 +37,11 @@ contains
       type(block_clock_t) :: clock
       logical :: has_left
 
-      call remove_walls(self, error)
-      if (allocated(self%traffic) .and. .not. allocated(error)) call exchange_bodies(self, error)
+      call change_bodies(self, error)
       if (allocated(error)) return
       self%step = self%step + 1_lp
       call expire_balance(self%energy_balance)
-      call change_cell(self%dt, real(self%step - 1_lp, wp)*self%dt, time_of(self), self%bodies)
-      if (abs(self%bodies%cell%kick) > 0.0_wp) call self%motion%flight%forget_velocities()
-      call check_cell(self, error)
+      call begin_step(self, error)
       associate (timers => self%timers, domain => self%domain)
          call timers%start()
          if (domain%has_halo()) then
@@ -77,33 +71,14 @@ contains
          call add_other_forces(self, error)
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
-         ! Loads need all ranks.
-         if (self%settings%overlap%degenerate == 'stop' .or. allocated(self%walls%loads) &
-             .or. allocated(self%bodies%cell%load)) call self%comm%all_reduce_error(error)
+         if (self%agrees_on_errors) call self%comm%all_reduce_error(error)
          if (allocated(error)) return
-         if (allocated(self%walls%loads)) call self%walls%yield(self%comm, self%dt, time_of(self), &
-                                                                   present_gravity(self), self%bodies, self%loop%walls)
-         if (allocated(self%bodies%cell%load)) &
-            call yield_cell(self%comm, self%dt, time_of(self), self%loop%virial, self%bodies%cell)
+         call follow_forces(self, self%dt)
          call complete_step(self, error)
+         call end_step(self)
          call timers%lap(stage_integrate)
       end associate
    end subroutine advance
-
-   !> Check that a cell that yields is large enough for its bodies. All ranks find the same.
-   subroutine check_cell(self, error)
-      type(simulation_t), intent(in) :: self
-      type(error_t), allocatable, intent(inout) :: error
-
-      associate (cell => self%bodies%cell)
-         if (.not. allocated(cell%load)) return
-         if (all(cell%size > cell%load%least)) return
-         call raise(error, run_error, 'step '//to_text(self%step)//': the cell has shrunk to '// &
-                    to_text(cell%size(1))//' x '//to_text(cell%size(2))//' m, but the largest body needs more than '// &
-                    to_text(cell%load%least)//' m, twice its diameter. Start with more bodies, or reduce the '// &
-                    'stress in &cell')
-      end associate
-   end subroutine check_cell
 
    !> Update vertices and boxes of all but the free bodies, and all images.
    subroutine bound_others(self, has_left, error)
@@ -150,17 +125,14 @@ contains
       end associate
    end subroutine find_pairs
 
-   !> Whether the loop over the contacts keeps the table of all contacts: for the caller, or for a constraint
+   !> Whether the loop over the contacts keeps the table of all contacts: for the caller, a constraint or a participant
    pure logical function needs_table(self, tabulate)
       type(simulation_t), intent(in) :: self
       !> Whether the caller needs it; absent: yes
       logical, intent(in), optional :: tabulate
 
       needs_table = .true.
-      if (present(tabulate)) needs_table = tabulate .or. allocated(self%law%constraint)
-      ! The elastic energy of the contacts of bodies that leave
-      if (allocated(self%traffic)) &
-         needs_table = needs_table .or. self%traffic%has_departures(self%step)
+      if (present(tabulate)) needs_table = tabulate .or. allocated(self%law%constraint) .or. need_table(self)
    end function needs_table
 
    !> Add forces on bodies that are no contacts, and the forces of a velocity constraint, if there are any.

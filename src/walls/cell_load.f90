@@ -5,8 +5,9 @@
 !>
 !>     M d2L/dt2 = (s - p) L' - c dL/dt,
 !>
-!> L' being the size along the other axis (H.C. Andersen, J. Chem. Phys. 72 (1980) 2384, with a damping). It is
-!> integrated by velocity Verlet, as loads on walls are; the damping is implicit in the velocity at the end of the step.
+!> L' being the size along the other axis (H.C. Andersen, J. Chem. Phys. 72 (1980) 2384, with a damping), integrated as
+!> the wall of a load is (`polydem_driven`). The kinetic energy of the cell is in no balance: that of the bodies has the
+!> work of the contacts on it.
 !>
 !> The stress is a sum over all contacts in each step. Each product of force and distance is rounded to a multiple of a
 !> unit, so that the sum is one of integers: it has the same bits for any number of threads and ranks. The unit is 2^-44
@@ -15,6 +16,7 @@ module polydem_cell_load
    use polydem_cell, only: cell_load_t, cell_t
    use polydem_communicator, only: communicator_t
    use polydem_contact_block, only: contact_block_t
+   use polydem_driven, only: ramp_t
    use polydem_force_sums, only: contact_terms_t, of_elastic, of_normal, of_tangential, sum_x, sum_y
    use polydem_kinds, only: ip, lp, wp
    use polydem_serializer, only: serializer_t
@@ -37,8 +39,7 @@ contains
       real(wp), intent(in) :: diameter
       type(cell_load_t), intent(inout) :: load
 
-      if (.not. load%mass > 0.0_wp) load%mass = usual
-      load%damping = load%damping_ratio*2.0_wp*sqrt(stiffness*load%mass)
+      call load%axis%set_mass(usual, stiffness, 1.0_wp)
       load%unit = scale(1.0_wp, exponent(stiffness*diameter*diameter) - unit_bits)
    end subroutine set_cell_mass
 
@@ -101,48 +102,23 @@ contains
             if (.not. load%yields(axis)) cycle
             ! In compression the forces are against the distances.
             force = -sum(total(axis, :))/cell%size(axis) - present_stress(load, axis, time)*cell%size(3 - axis)
-            call correct(load, axis, dt, time, force)
+            call load%axis(axis)%correct(dt, time, force)
          end do
-         load%power = -matmul(load%speed/cell%size, total)
+         load%power = -matmul(load%axis%speed/cell%size, total)
          if (dt > 0.0_wp) load%power_sum = load%power_sum + load%power
          if (.not. dt > 0.0_wp) load%power_sum = 0.5_wp*load%power
       end associate
    end subroutine yield_cell
-
-   !> Correct the velocity of the size along an axis.
-   pure subroutine correct(load, axis, dt, time, force)
-      type(cell_load_t), intent(inout) :: load
-      integer, intent(in) :: axis
-      real(wp), intent(in) :: dt, time
-      !> Force of contacts and prescribed stress [N/m]
-      real(wp), intent(in) :: force
-
-      if (time < load%start .or. time >= load%end) then
-         load%speed(axis) = 0.0_wp
-         load%change(axis) = 0.0_wp
-      else if (.not. dt > 0.0_wp .or. time - dt < load%start) then
-         ! The first force acts on a cell at rest.
-         load%speed(axis) = 0.0_wp
-         load%change(axis) = force/load%mass
-      else
-         load%speed(axis) = (load%half(axis) + 0.5_wp*dt*force/load%mass)/(1.0_wp + 0.5_wp*dt*load%damping/load%mass)
-         load%change(axis) = (force - load%damping*load%speed(axis))/load%mass
-      end if
-   end subroutine correct
 
    !> Prescribed stress along an axis at a time [N/m2]
    pure real(wp) function present_stress(load, axis, time) result(stress)
       type(cell_load_t), intent(in) :: load
       integer, intent(in) :: axis
       real(wp), intent(in) :: time
-      real(wp) :: u
+      type(ramp_t) :: ramp
 
-      stress = 0.0_wp
-      if (time < load%start) return
-      stress = load%stress(axis)
-      if (time - load%start >= load%ramp) return
-      u = (time - load%start)/load%ramp
-      stress = stress*(u*u*(3.0_wp - 2.0_wp*u))
+      ramp = load%axis(axis)%ramp_at(time)
+      stress = load%stress(axis)*ramp%factor
    end function present_stress
 
    !> Serialize the motion of a cell that yields.
@@ -152,13 +128,14 @@ contains
       class(serializer_t), intent(inout) :: serializer
       real(wp) :: values(11)
 
-      values = [cell%size, cell%load%speed, cell%load%change, cell%shift, cell%jump, cell%load%power_sum]
+      values = [cell%size, cell%load%axis%speed, cell%load%axis%change, cell%shift, cell%jump, cell%load%power_sum]
       call serializer%field('/run/cell', values, '1', 'size of the periodic cell, its velocity and acceleration, '// &
                             'shift and jump, and sums of powers, in SI units')
       if (.not. serializer%is_reading .or. allocated(serializer%error)) return
       cell%size = values(1:2)
-      cell%load%speed = values(3:4)
-      cell%load%change = values(5:6)
+      cell%load%axis%place = cell%size
+      cell%load%axis%speed = values(3:4)
+      cell%load%axis%change = values(5:6)
       cell%shift = values(7)
       cell%jump = values(8)
       cell%load%power_sum = values(9:11)

@@ -1,9 +1,7 @@
 !> Loads: a force, a stress or a torque on a named wall, which yields along one direction by Newton's law.
 !>
-!> A load has one degree of freedom, the displacement of the wall along x or y, or its angle about a pivot. It is
-!> integrated by velocity Verlet as bodies are; the damping of the wall is implicit in its velocity at the end of the
-!> step, so it is stable for any coefficient. Before its start and from its end on, the wall is at rest where it is. The
-!> displacement comes on top of the motions of the wall.
+!> A load has one degree of freedom (`polydem_driven`), the displacement of the wall along x or y, or its angle about a
+!> pivot. The displacement comes on top of the motions of the wall.
 !>
 !> The mass of a wall is spread evenly over the area of its bodies, as they are at the start. If the wall has a weight,
 !> the gravity that acts on the bodies acts on this mass, too.
@@ -12,23 +10,22 @@
 module polydem_wall_load
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
+   use polydem_driven, only: along_angle, driven_t, ramp_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
    use polydem_kinds, only: ip, wp
+   use polydem_motion, only: turn_about
    use polydem_named_values, only: named_values_t
    use polydem_named_walls, only: named_walls_t
-   use polydem_prescribed_motion, only: turn_about
    use polydem_serializer, only: serializer_t
    use polydem_wall_record, only: force_about
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: wall_load_t, along_angle, of_load, of_damping, of_contacts, of_kinetic, n_energies
+   public :: wall_load_t, of_load, of_damping, of_contacts, of_kinetic, n_energies
    public :: set_masses, predict_loads, carry_walls, correct_loads, energies_of_loads, serialize_loads, set_load_columns
    public :: wall_mobilities
 
-   !> Direction of a turn; 1 and 2 are x and y
-   integer, parameter :: along_angle = 3
    !> Energies of a load: its work, that of the damping of its wall and that of the contacts on it, then the kinetic
    !> energy of the wall
    integer, parameter :: of_load = 1, of_damping = 2, of_contacts = 3, of_kinetic = 4, n_energies = 4
@@ -36,7 +33,7 @@ module polydem_wall_load
    integer, parameter :: n_saved = 6
 
    !> A load with its degree of freedom
-   type :: wall_load_t
+   type, extends(driven_t) :: wall_load_t
       !> Name of the group &load
       character(len=:), allocatable :: name
       !> Number of its named wall
@@ -51,24 +48,10 @@ module polydem_wall_load
       integer(ip) :: between(2) = 0_ip
       !> Centre of a turn, (2) [m]
       real(wp) :: pivot(2) = 0.0_wp
-      !> Mass [kg/m] or moment of inertia [kg m]; 0: from the free bodies
-      real(wp) :: mass = 0.0_wp
       !> Whether gravity acts on the wall
       logical :: has_weight = .false.
       !> The mass on which it acts; 0 without weight [kg/m]
       real(wp) :: heavy = 0.0_wp
-      !> Damping over the critical one, and the coefficient of the damping [kg/(m s)], of a turn [kg m/s]
-      real(wp) :: damping_ratio = 1.0_wp, damping = 0.0_wp
-      !> Times between which the wall yields [s]
-      real(wp) :: start = 0.0_wp, end = huge(1.0_wp)
-      !> Number of the stage of the run in which it acts, which sets start and end; 0: it depends on no stage
-      integer(ip) :: stage = 0_ip
-      !> Time in which the force grows [s]
-      real(wp) :: ramp = 0.0_wp
-      !> Displacement [m] or angle [rad], and its derivatives
-      real(wp) :: place = 0.0_wp, speed = 0.0_wp, change = 0.0_wp
-      !> Velocity in the middle of the step
-      real(wp) :: half = 0.0_wp
       !> Present force of the load, with that of gravity, and of the contacts along the direction; torques of a turn
       real(wp) :: applied = 0.0_wp, contact = 0.0_wp
       !> Number of contacts of the wall in the run
@@ -97,10 +80,8 @@ contains
          associate (load => loads(k))
             square = 1.0_wp
             if (load%direction == along_angle) square = walls%gyration_square(load%wall, load%pivot, bodies)
-            if (.not. load%mass > 0.0_wp) load%mass = usual
-            if (load%has_weight) load%heavy = load%mass
-            load%damping = load%damping_ratio*2.0_wp*sqrt(stiffness*load%mass)*square
-            load%mass = load%mass*square
+            if (load%has_weight) load%heavy = merge(load%mass, usual, load%mass > 0.0_wp)
+            call load%set_mass(usual, stiffness, square)
          end associate
       end do
    end subroutine set_masses
@@ -114,11 +95,7 @@ contains
       integer :: k
 
       do k = 1, size(loads)
-         associate (load => loads(k))
-            load%half = load%speed + 0.5_wp*dt*load%change
-            load%place = load%place + dt*load%half
-            load%speed = load%half + 0.5_wp*dt*load%change
-         end associate
+         call loads(k)%predict(dt)
       end do
    end subroutine predict_loads
 
@@ -134,7 +111,7 @@ contains
       do k = 1, size(loads)
          associate (load => loads(k), slots => walls%wall(loads(k)%wall)%slots)
             if (load%direction == along_angle) then
-               call turn_about(load%pivot, load%place, load%speed, load%change, slots, bodies)
+               call turn_about(load%pivot, [load%place, load%speed, load%change], slots, bodies)
                cycle
             end if
             do j = 1, size(slots)
@@ -164,29 +141,16 @@ contains
       !> Contacts of this rank with fixed bodies
       type(wall_terms_t), intent(in) :: terms
       integer :: k
-      logical :: yields
 
       call find_contact_forces(loads, comm, walls, bodies, terms)
       do k = 1, size(loads)
          associate (load => loads(k))
             load%applied = applied_force(load, walls, bodies, time, gravity)
-            yields = time >= load%start .and. time < load%end
-            if (.not. yields) then
-               ! What stops a moving wall takes its kinetic energy, as a damping does, and the work of half a step that
-               ! the sums have since then.
-               if (dt > 0.0_wp) load%sums(of_damping) = load%sums(of_damping) &
-                  - 0.5_wp*load%mass*(load%half**2 - (0.5_wp*dt*load%change)**2)/dt
-               load%speed = 0.0_wp
-               load%change = 0.0_wp
-            else if (.not. dt > 0.0_wp .or. time - dt < load%start) then
-               ! The first force acts on a wall at rest.
-               load%speed = 0.0_wp
-               load%change = (load%applied + load%contact)/load%mass
-            else
-               load%speed = (load%half + 0.5_wp*dt*(load%applied + load%contact)/load%mass) &
-                            /(1.0_wp + 0.5_wp*dt*load%damping/load%mass)
-               load%change = (load%applied + load%contact - load%damping*load%speed)/load%mass
-            end if
+            ! What stops a moving wall takes its kinetic energy, as a damping does, and the work of half a step that the
+            ! sums have since then.
+            if (dt > 0.0_wp .and. .not. load%is_open(time)) load%sums(of_damping) = load%sums(of_damping) &
+               - 0.5_wp*load%mass*(load%half**2 - (0.5_wp*dt*load%change)**2)/dt
+            call load%correct(dt, time, load%applied + load%contact)
             load%last = [load%applied*load%speed, -load%damping*load%speed**2, load%contact*load%speed]
             if (dt > 0.0_wp) load%sums = load%sums + load%last
             if (.not. dt > 0.0_wp) load%sums = 0.5_wp*load%last
@@ -233,17 +197,15 @@ contains
       real(wp), intent(in) :: time
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      real(wp) :: width, u
+      type(ramp_t) :: ramp
+      real(wp) :: width
 
       force = 0.0_wp
-      if (time < load%start .or. time >= load%end) return
+      if (.not. load%is_open(time)) return
       width = load%width
       if (all(load%between > 0_ip)) width = max(0.0_wp, walls%gap(load%between, 3 - load%direction, bodies))
-      force = load%force + load%stress*width
-      if (time - load%start < load%ramp) then
-         u = (time - load%start)/load%ramp
-         force = force*(u*u*(3.0_wp - 2.0_wp*u))
-      end if
+      ramp = load%ramp_at(time)
+      force = (load%force + load%stress*width)*ramp%factor
       if (load%has_weight) force = force + weight_of(load, walls, bodies, gravity)
    end function applied_force
 

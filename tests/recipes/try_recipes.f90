@@ -1,18 +1,22 @@
-!> Runs the example force part, finder, force on bodies and guard of the recipes; check_recipes.py checks the output.
+!> Runs the examples of the recipes; check_recipes.py checks the output.
 program try_recipes
    use trial, only: begin, block_at, steps
    use polydem_bodies, only: state_hash
    use polydem_body_list, only: body_list_t
    use polydem_contact_history, only: column_of
    use polydem_energy_balance, only: balance_t
+   use polydem_end_condition, only: measure_condition
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
+   use polydem_named_values, only: named_values_t
    use polydem_monitor, only: check_step, monitor_t, new_monitor
    use polydem_read_settings, only: read_settings_text
+   use polydem_sample_columns, only: set_sample_columns
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t, compute_balance
    use polydem_start, only: new_simulation
+   use polydem_strings, only: index_of
    use polydem_time_step, only: advance
    implicit none
 
@@ -25,6 +29,11 @@ program try_recipes
    call run_gas('all_pairs')
    call run_gas('plain_loop')
    call turn()
+   call go_round()
+   call fall()
+   call slow_down()
+   call speed_up()
+   call draw_triangle()
    call spin()
 
 contains
@@ -114,6 +123,102 @@ contains
          print '(a, 2es24.16)', 'magnus', atan2(v(2), v(1)), sum(v**2) - 1.0_wp
       end associate
    end subroutine turn
+
+   !> Move a wall by three eighths of a circle; print how far its centre is from where it should be, over the radius.
+   subroutine go_round()
+      character(len=*), parameter :: text = '&grains name = ''g'' region = ''at'' at = 0, 1 / &wall name = ''w'' '// &
+         'outline = ''rectangle'' low = -1, -1 high = 1, 0 / &motion name = ''m'' wall = ''w'' kind = ''orbit'' '// &
+         'amplitude = 0.5, 0 frequency = 2 / &forces gravity = 0, 0 / &integrate duration = 1 dt = 1e-4 /'
+      character(len=1) :: no_overrides(0)
+      real(wp), parameter :: root = sqrt(0.5_wp)
+      type(settings_t) :: settings
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+
+      call read_settings_text('orbit.nml', text, no_overrides, settings, error)
+      if (failed(error)) return
+      call new_simulation(settings, simulation, error)
+      if (failed(error)) return
+      call steps(simulation, 1875, error)
+      if (failed(error)) return
+      associate (slots => simulation%walls%driven(1)%slots)
+         print '(a, 2es24.16)', 'orbit', (simulation%bodies%position(:, slots(1)) &
+                                          - ([0.0_wp, -0.5_wp] + 0.5_wp*[-root - 1.0_wp, root]))/0.5_wp
+      end associate
+   end subroutine go_round
+
+   !> Print the order of the example integrator for a body that falls.
+   subroutine fall()
+      type(simulation_t) :: simulation
+      type(body_list_t) :: list
+      type(error_t), allocatable :: error
+      character(len=8) :: dt
+      real(wp) :: wrong(2)
+      integer :: k
+
+      call list%append(block_at(0.0_wp, 0.0_wp, side, side, 0.0_wp))
+      do k = 1, 2
+         write (dt, '(es8.1)') 1.0e-3_wp/real(k, wp)
+         call begin('&forces gravity = 0, -10 / &integrate scheme = ''symplectic_euler'' duration = 1 dt = '// &
+                    dt//' /', list, simulation, error)
+         if (failed(error)) return
+         call steps(simulation, 100*k, error)
+         if (failed(error)) return
+         wrong(k) = simulation%bodies%position(2, 1) + 0.5_wp*10.0_wp*0.1_wp**2
+      end do
+      print '(a, es24.16)', 'euler_order ', log(wrong(1)/wrong(2))/log(2.0_wp)
+   end subroutine fall
+
+   !> Print the speed that a brake leaves after 0.4 s, and the residual of the energy.
+   subroutine slow_down()
+      type(simulation_t) :: simulation
+      type(body_list_t) :: list
+      type(balance_t) :: balance
+      type(error_t), allocatable :: error
+
+      call list%append(block_at(0.0_wp, 0.0_wp, side, side, 0.0_wp), velocity=[1.0_wp, 0.0_wp])
+      call begin('&forces gravity = 0, 0 drag = 1e-9 / &integrate duration = 1 dt = 1e-3 /', list, simulation, error)
+      if (failed(error)) return
+      call steps(simulation, 400, error)
+      if (failed(error)) return
+      call compute_balance(simulation, balance)
+      print '(a, 2es24.16)', 'brake', simulation%bodies%velocity(1, 1), balance%energy_residual
+   end subroutine slow_down
+
+   !> Print the greatest speed of two bodies as a column of the series, and as the quantity of a stage.
+   subroutine speed_up()
+      type(simulation_t) :: simulation
+      type(body_list_t) :: list
+      type(named_values_t) :: row
+      type(error_t), allocatable :: error
+
+      call list%append(block_at(0.0_wp, 0.0_wp, side, side, 0.0_wp), velocity=[1.0_wp, 0.0_wp])
+      call list%append(block_at(1.0_wp, 0.0_wp, side, side, 0.0_wp), velocity=[0.0_wp, 2.0_wp])
+      call begin('&forces gravity = 0, 0 / &integrate dt = 1e-3 / &stage name = ''one'' until = ''speed'' '// &
+                 'below = 1 longest = 1 check = 1 / &stage name = ''two'' duration = 1 /', list, simulation, error)
+      if (failed(error)) return
+      call advance(simulation, error, tabulate=.true.)
+      if (failed(error)) return
+      call measure_condition(simulation)
+      call set_sample_columns(simulation, row)
+      print '(a, 2es24.16)', 'greatest_speed', row%value(index_of('greatest_speed', row%name)), simulation%stages%value
+   end subroutine speed_up
+
+   !> Print the area of a triangle.
+   subroutine draw_triangle()
+      character(len=*), parameter :: text = '&scene density = 1 / &grains name = ''g'' region = ''at'' at = 0, 0 '// &
+         'shape = ''triangle'' width = 1 height = 1 / &forces gravity = 0, 0 / &integrate duration = 1 dt = 1e-4 /'
+      character(len=1) :: no_overrides(0)
+      type(settings_t) :: settings
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+
+      call read_settings_text('triangle.nml', text, no_overrides, settings, error)
+      if (failed(error)) return
+      call new_simulation(settings, simulation, error)
+      if (failed(error)) return
+      print '(a, es24.16)', 'triangle_area ', simulation%bodies%mass(1)
+   end subroutine draw_triangle
 
    !> Print the warnings of the example guard about a body that spins slowly, and about one that spins fast.
    subroutine spin()

@@ -11,7 +11,7 @@ module scene_checks
    implicit none
    private
    public :: make_scene, scene_message, find_vertices, polygon_area, all_convex, count_overlaps
-   public :: count_differences
+   public :: count_differences, kinds_of
 
 contains
 
@@ -37,6 +37,19 @@ contains
       if (present(settings)) settings = own_settings
       if (present(walls) .and. .not. allocated(error)) call move_alloc(own_walls%driven, walls)
    end subroutine make_scene
+
+   !> Kinds of the motions of a wall, separated by blanks
+   function kinds_of(wall) result(text)
+      type(wall_t), intent(in) :: wall
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      do k = 1, size(wall%motions)
+         text = text//' '//wall%motions(k)%motion%kind
+      end do
+      text = trim(adjustl(text))
+   end function kinds_of
 
    !> Message of the error of a scene; empty if there is none
    function scene_message(entries) result(message)

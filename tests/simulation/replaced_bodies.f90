@@ -19,7 +19,8 @@ program replaced_bodies
    use polydem_hdf5_file, only: start_library
    use polydem_kinds, only: ip, lp, wp
    use polydem_posix_processes, only: c_exit
-   use polydem_prescribed_motion, only: motion_t
+   use polydem_motion, only: motion_item_t
+   use polydem_oscillation, only: oscillation_t
    use polydem_read_settings, only: read_settings_text
    use polydem_replace_bodies, only: replace_bodies
    use polydem_settings, only: settings_t
@@ -185,7 +186,8 @@ contains
       logical, intent(in) :: with_pile, with_far
       type(simulation_t), intent(out) :: simulation
       type(settings_t) :: settings
-      type(motion_t) :: motion
+      type(oscillation_t) :: motion
+      type(motion_item_t) :: items(1)
       integer(ip), allocatable :: slots(:)
       integer(ip) :: s
 
@@ -194,10 +196,10 @@ contains
       call make(comm, with_pile, with_far, simulation%bodies)
       slots = pack([(s, s=1_ip, simulation%bodies%n)], simulation%bodies%fixed)
       allocate (simulation%walls%driven(merge(1, 0, with_pile)))
-      motion%kind = 'oscillation'
       motion%amplitude = [1.0e-3_wp, 5.0e-4_wp]
       motion%frequency = 400.0_wp
-      if (with_pile) call new_wall(simulation%walls%driven(1), [motion], simulation%bodies, slots(2:))
+      allocate (items(1)%motion, source=motion)
+      if (with_pile) call new_wall(simulation%walls%driven(1), items, simulation%bodies, slots(2:))
       call start_with_bodies(settings, comm, simulation, error)
       call comm%all_reduce_error(error)
    end subroutine start

@@ -20,7 +20,7 @@ module b10_stick_slip
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: motion_t
+   use polydem_oscillation, only: oscillation_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    implicit none
@@ -129,7 +129,7 @@ contains
       type(simulation_t), intent(out) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       type(body_list_t) :: list
-      type(motion_t) :: motion
+      type(oscillation_t) :: motion
       real(wp) :: depth, start, distance
       real(wp), parameter :: floor = 0.1_wp
 
@@ -141,7 +141,6 @@ contains
       call list%append(block_at(distance, 0.5_wp*height, post, thickness, 0.0_wp), fixed=.true.)
       call list%append(block_at(-distance, 0.5_wp*height, post, thickness, 0.0_wp), fixed=.true.)
       call list%append(block_at(0.0_wp, -0.5_wp*floor, 1.0_wp, floor, 0.0_wp), fixed=.true.)
-      motion%kind = 'oscillation'
       motion%amplitude = [drive%amplitude*unit, 0.0_wp]
       motion%frequency = drive%rate*frequency
       ! A cosine is a sine with the phase of a quarter of a period.

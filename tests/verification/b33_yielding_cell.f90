@@ -63,7 +63,7 @@ contains
                           simulation, error)
          if (allocated(error)) exit
          start = simulation%bodies%cell%size(2)
-         if (k == 1) stiffness = mass*simulation%bodies%cell%load%change(2)/depth
+         if (k == 1) stiffness = mass*simulation%bodies%cell%load%axis(2)%change/depth
          call steps(simulation, n, error)
          if (allocated(error)) exit
          growth(k) = simulation%bodies%cell%size(2) - start

@@ -6,7 +6,7 @@ module trial
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: motion_t
+   use polydem_motion, only: motion_item_t, motion_t
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: compute_balance, simulation_t
@@ -33,12 +33,13 @@ contains
       !> What went wrong
       type(error_t), allocatable, intent(inout) :: error
       !> Prescribed motion of some bodies
-      type(motion_t), intent(in), optional :: motion
+      class(motion_t), intent(in), optional :: motion
       !> Slots of the bodies that the motion moves, given with it
       integer(ip), intent(in), optional :: moved(:)
       type(settings_t) :: settings
       type(bodies_t) :: bodies
       type(wall_t), allocatable :: walls(:)
+      type(motion_item_t) :: items(1)
       character(len=1) :: no_overrides(0)
 
       call read_settings_text('trial.nml', "&scene name = 'file' bodies_file = 'none' /"//new_line('a')//text, &
@@ -47,7 +48,10 @@ contains
       call new_bodies(list, bodies, error)
       if (allocated(error)) return
       allocate (walls(merge(1, 0, present(motion))))
-      if (present(motion)) call new_wall(walls(1), [motion], bodies, moved)
+      if (present(motion)) then
+         allocate (items(1)%motion, source=motion)
+         call new_wall(walls(1), items, bodies, moved)
+      end if
       call start_simulation(settings, bodies, walls, simulation, error)
    end subroutine begin
 

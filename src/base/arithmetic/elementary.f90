@@ -12,7 +12,9 @@ module polydem_elementary
    implicit none
    private
    public :: sine, cosine, sine_and_cosine, sines_and_cosines, tangent, arc_cosine, exponential, logarithm, hypotenuse
+   public :: pi, two_pi
 
+   real(wp), parameter :: pi = 3.14159265358979323846264338327950288_wp, two_pi = 2.0_wp*pi
    !> Whether the working precision is quadruple
    logical, parameter :: is_quadruple = precision(1.0_wp) > precision(1.0_dp)
    !> Number of angles of a block

@@ -142,16 +142,15 @@ contains
       type(motion_settings_t), intent(in) :: motion
       real(wp) :: along(2)
 
-      along = 0.0_wp
-      if (motion%kind == 'translation') along = motion%velocity
-      if (motion%kind == 'oscillation') along = motion%amplitude
+      along = motion%amplitude
+      if (motion%kind /= 'conveyor') along = along + motion%velocity
       select case (direction)
       case ('x')
          moves_along = abs(along(1)) > 0.0_wp
       case ('y')
          moves_along = abs(along(2)) > 0.0_wp
       case default
-         moves_along = motion%kind == 'rotation'
+         moves_along = abs(motion%rate) > 0.0_wp
       end select
    end function moves_along
 

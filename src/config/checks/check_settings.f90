@@ -166,7 +166,7 @@ contains
 
       do k = 1, size(settings%motion)
          associate (motion => settings%motion(k))
-            if (motion%kind == 'oscillation') call require( &
+            call require( &
                two_pi*motion%frequency*maxval(abs(motion%amplitude)) < speed_limit, too_fast, 'amplitude', &
                'frequency', instances(index_of_instance(instances, 'motion', motion%name)), error)
             if (motion%end > 0.0_wp) call require( &

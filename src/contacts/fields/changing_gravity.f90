@@ -3,15 +3,13 @@
 !> The constant part is that of `gravity`, whose potential the balance has. This is the rest: its work comes from
 !> outside, like that of a moving wall. An oscillation is what grains feel in a container that shakes, seen from it.
 module polydem_changing_gravity
-   use polydem_elementary, only: sine_and_cosine
+   use polydem_elementary, only: sine_and_cosine, two_pi
    use polydem_kinds, only: wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: changing_gravity_t, changes_gravity, new_changing_gravity
 
-   !> Angle of a full turn [rad]
-   real(wp), parameter :: two_pi = 6.283185307179586_wp
 
    !> The part of gravity that is not constant
    type :: changing_gravity_t

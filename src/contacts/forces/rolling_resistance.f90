@@ -18,6 +18,7 @@ module polydem_rolling_resistance
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
+   use polydem_elementary, only: pi
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
    use polydem_linearised_contact, only: linearised_contact_t
@@ -53,7 +54,6 @@ module polydem_rolling_resistance
 
    !> k_r over E mu_r^2 R^2
    real(wp), parameter :: bed_factor = 3.0_wp
-   real(wp), parameter :: pi = 3.14159265358979324_wp
 
 contains
 

@@ -321,7 +321,7 @@ contains
       real(wp) :: rate(2)
       integer(ip) :: c
 
-      rate = bodies%cell%load%speed/bodies%cell%size
+      rate = bodies%cell%load%axis%speed/bodies%cell%size
       do c = 1_ip, block%n
          block%velocity_second(c, :) = block%velocity_second(c, :) &
                                        + rate*(block%arm_first(c, :) - block%arm_second(c, :))

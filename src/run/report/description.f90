@@ -13,7 +13,7 @@ module polydem_description
    use polydem_run_duration, only: longest_run
    use polydem_rigidity, only: describe_rigidity
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text, counted, join
+   use polydem_strings, only: to_text, counted
    use polydem_scene_measures, only: scene_measures_t
    implicit none
    private
@@ -94,10 +94,10 @@ contains
             do axis = 1, 2
                if (.not. cell%load%yields(axis)) cycle
                text = text//'; obeys '//to_text(cell%load%stress(axis), 3)//' N/m2 along '//name(axis)
-               if (cell%load%damping > 0.0_wp) text = text//', closes at '// &
-                  to_text(cell%load%stress(axis)*cell%size(3 - axis)/cell%load%damping, 3)//' m/s'
+               if (cell%load%axis(axis)%damping > 0.0_wp) text = text//', closes at '// &
+                  to_text(cell%load%stress(axis)*cell%size(3 - axis)/cell%load%axis(axis)%damping, 3)//' m/s'
             end do
-            text = text//'; mass '//to_text(cell%load%mass, 3)//' kg/m'
+            text = text//'; mass '//to_text(cell%load%axis(1)%mass, 3)//' kg/m'
          end if
       end associate
       if (simulation%n_outside == 1_lp) text = text//'; 1 body outside was moved into it'
@@ -283,15 +283,18 @@ contains
    !> Kinds of the motions and number of bodies of each wall that moves or yields
    function motion_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation
-      character(len=:), allocatable :: text
-      integer :: k
+      character(len=:), allocatable :: text, kinds
+      integer :: j, k
 
       text = ''
       do k = 1, size(simulation%walls%driven)
          associate (wall => simulation%walls%driven(k))
-            text = text//', '//join(wall%motions%kind, ' and ')
-            if (wall%is_loaded .and. size(wall%motions) > 0) text = text//' and '
-            if (wall%is_loaded) text = text//'yielding'
+            kinds = ''
+            do j = 1, size(wall%motions)
+               kinds = kinds//' and '//wall%motions(j)%motion%kind
+            end do
+            if (wall%is_loaded) kinds = kinds//' and yielding'
+            text = text//', '//kinds(len(' and ') + 1:)
             text = text//' of '//counted(size(wall%slots, kind=lp), 'wall')
          end associate
       end do

@@ -1,12 +1,12 @@
 !> Warnings at the end of a run: of what the input asked for and the run did not give.
 module polydem_end_warnings
+   use polydem_driven, only: along_angle
    use polydem_end_condition, only: ended_at_once
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
    use polydem_source, only: source_t
    use polydem_strings, only: to_text
-   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: write_end_warnings, warn_of_end
@@ -67,10 +67,10 @@ contains
       associate (cell => simulation%bodies%cell, load => simulation%bodies%cell%load)
          do axis = 1, 2
             if (.not. load%yields(axis)) cycle
-            borne = -load%damping*load%speed(axis)/cell%size(3 - axis)
+            borne = -load%axis(axis)%damping*load%axis(axis)%speed/cell%size(3 - axis)
             if (abs(borne) <= noticed*abs(load%stress(axis))) cycle
             call log%write_line('warning: the size of the cell along '//name(axis)//' changes at '// &
-               to_text(load%speed(axis), 3)//' m/s at the end: its damping bears '//to_text(borne, 3)//' of '// &
+               to_text(load%axis(axis)%speed, 3)//' m/s at the end: its damping bears '//to_text(borne, 3)//' of '// &
                to_text(load%stress(axis), 3)//' N/m2, the contacts only the rest. Let it run longer, or reduce '// &
                'damping_ratio and mass in &cell')
          end do

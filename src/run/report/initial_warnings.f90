@@ -3,7 +3,7 @@
 !> Each warning names a probable mistake of the input. The warnings cost no time in a step; the guards that a run
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
-   use polydem_elementary, only: hypotenuse
+   use polydem_elementary, only: hypotenuse, two_pi
    use polydem_entry_warnings, only: warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
    use polydem_motion_check, only: shorter_step
@@ -26,8 +26,6 @@ module polydem_initial_warnings
    !> Warning limit of the distance that a body moves in a step, and of the overlap that an impact causes, as a fraction
    !> of the thickness of the thinnest body
    real(wp), parameter :: fast_fraction = 0.25_wp
-   !> Twice the number pi
-   real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Plausible range of the median diameter [m]
    real(wp), parameter :: diameters(2) = [1.0e-6_wp, 1.0_wp]
    !> Range of densities of solids, including foams [kg/m3]
@@ -84,10 +82,9 @@ contains
 
       do k = 1, size(simulation%walls%driven)
          do j = 1, size(simulation%walls%driven(k)%motions)
-            associate (motion => simulation%walls%driven(k)%motions(j), &
+            associate (motion => simulation%walls%driven(k)%motions(j)%motion, &
                        duration => simulation%settings%integrate%duration)
-               if (.not. allocated(motion%table)) cycle
-               last = motion%start + motion%table%time(size(motion%table%time))
+               last = motion%rests_from()
                if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
                   'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
                   to_text(duration, 3)//' s; from then on its bodies rest in the last pose')
@@ -148,7 +145,7 @@ contains
    pure logical function moves_away(kind)
       character(len=*), intent(in) :: kind
 
-      moves_away = kind == 'translation' .or. kind == 'rotation' .or. kind == 'table'
+      moves_away = kind /= 'oscillation' .and. kind /= 'conveyor'
    end function moves_away
 
    !> Whether the grains of a group go against and along each axis: by gravity, with their velocity, or through the
@@ -256,9 +253,8 @@ contains
       text = ''
       do k = 1, size(settings%motion)
          associate (motion => settings%motion(k))
-            if (motion%kind /= 'oscillation') cycle
             associate (amplitude => hypotenuse(motion%amplitude(1), motion%amplitude(2)))
-               if (two_pi*motion%frequency*amplitude < 0.5_wp*speed) cycle
+               if (.not. two_pi*motion%frequency*amplitude > 0.5_wp*speed) cycle
                text = ' that shakes with the amplitude '//to_text(amplitude, 3)//' m and the frequency '// &
                   to_text(motion%frequency, 3)//' Hz (is it in m and in Hz?)'
             end associate

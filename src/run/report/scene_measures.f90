@@ -5,6 +5,7 @@ module polydem_scene_measures
    use polydem_communicator, only: communicator_t
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text, thinner_pieces
    use polydem_contacts, only: contacts_t
+   use polydem_driven, only: along_angle
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
@@ -16,7 +17,6 @@ module polydem_scene_measures
    use polydem_stability_check, only: find_stable_step
    use polydem_strings, only: to_text
    use polydem_wall, only: greatest_wall_speed
-   use polydem_wall_load, only: along_angle
    use polydem_walls, only: walls_t
    implicit none
    private

@@ -1,13 +1,13 @@
 !> Warnings about walls that the namelist probably places or loads otherwise than meant: walls that are pulled away,
 !> rows that leave a gap at the border of a periodic cell, and walls outside it.
 module polydem_wall_warnings
+   use polydem_driven, only: along_angle
    use polydem_kinds, only: wp
    use polydem_scene_measures, only: scene_measures_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: text_t, to_text
-   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: add, warn_of_copies, warn_of_pulls, warn_of_rows

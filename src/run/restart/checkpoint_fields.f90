@@ -9,24 +9,20 @@ module polydem_checkpoint_fields
    use polydem_balance_state, only: serialize_balance, serialize_contributions
    use polydem_begin_stage, only: continue_stages
    use polydem_bodies, only: piece_identifiers
-   use polydem_cell, only: shear_cell
-   use polydem_cell_load, only: serialize_cell
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_exchange_bodies, only: find_leaving
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_monitor, only: serialize_monitor, monitor_t
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_packed_state, only: find_walls
+   use polydem_participants, only: serialize_participants
    use polydem_replace_bodies, only: settle_bodies
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
-   use polydem_simulation, only: simulation_t, time_of
-   use polydem_vanishing_walls, only: find_release
-   use polydem_wall, only: has_table, hash_of_tables
-   use polydem_wall_load, only: serialize_loads
+   use polydem_simulation, only: simulation_t
+   use polydem_wall, only: hash_of_tables
    implicit none
    private
    public :: attempts_t, serialize_run, serialize_progress, read_pairs
@@ -95,7 +91,7 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
-      real(wp) :: shift, jump
+      integer(lp), allocatable :: tables(:)
       integer :: k
 
       call serialize_progress(serializer, simulation%step, attempts)
@@ -105,8 +101,9 @@ contains
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
          associate (driven => s%walls%driven)
-            if (any([(has_table(driven(k)), k=1, size(driven))])) call serializer%match('/run/motion_tables', &
-               [(hash_of_tables(driven(k)), k=1, size(driven))], '1', 'hash of the tables of motions')
+            tables = [(hash_of_tables(driven(k)), k=1, size(driven))]
+            if (any(tables /= 0_lp)) call serializer%match('/run/motion_tables', tables, '1', &
+                                                           'hash of the tables of motions')
          end associate
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
@@ -116,27 +113,8 @@ contains
          call serializer%seconds_field('/run/stage_least', s%timers%least, 'shortest time in a step')
          call serializer%seconds_field('/run/stage_most', s%timers%most, 'longest time in a step')
          if (s%settings%output%energy_balance) call serialize_balance(s%energy_balance, serializer)
-         if (.not. serializer%is_reading) call find_release(s)
-         call s%walls%named%serialize_gates(serializer)
-         if (.not. serializer%is_reading) call find_leaving(s)
-         if (allocated(s%traffic)) call s%traffic%serialize(s%step, serializer)
-         if (allocated(s%walls%loads)) call serialize_loads(s%walls%loads, serializer)
-         if (allocated(s%bodies%cell%load)) call serialize_cell(s%bodies%cell, serializer)
-         ! Bodies may enter before the next step.
-         if (serializer%is_reading .and. .not. allocated(s%bodies%cell%load)) &
-            call shear_cell(s%bodies%cell, time_of(s), time_of(s))
-         shift = s%bodies%cell%shift
-         jump = s%bodies%cell%jump
-         if (s%bodies%cell%is_sheared .and. .not. serializer%is_reading) then
-            call serializer%field('/run/shift', shift, 'm', 'displacement of the copy above a sheared cell, for a '// &
-                                  'run that starts from this one')
-            call serializer%field('/run/jump', jump, 'm/s', 'its velocity')
-         end if
-         if (s%settings%output%series_interval > 0.0_wp) then
-            call s%walls%record%serialize(serializer)
-            call s%series%serialize(serializer)
-         end if
       end associate
+      call serialize_participants(simulation, serializer)
    end subroutine serialize_global
 
    !> Serialize the progress of a run. This part of `serialize_run` needs no simulation.

@@ -5,7 +5,7 @@ module polydem_claim_folder
    use polydem_folder_lock, only: folder_lock_t, lock_path
    use polydem_kinds, only: ip
    use polydem_manifest, only: longest_name, manifest_t
-   use polydem_motion_file, only: table_path
+   use polydem_table_file, only: table_path
    use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
       series_name, steps_name, trace_name
    use polydem_set_aside, only: set_aside

@@ -7,10 +7,10 @@
 !> multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
-   use polydem_elementary, only: hypotenuse, sine_and_cosine
+   use polydem_elementary, only: hypotenuse, sine_and_cosine, pi
    use polydem_grain_list, only: area_of_grain, grain_t, grains_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_outlines, only: as_corners, pi, rectangle
+   use polydem_outlines, only: as_corners, rectangle
    use polydem_random, only: random_t
    use polydem_random_polygon, only: draw_random_polygon
    use polydem_settings, only: grains_settings_t

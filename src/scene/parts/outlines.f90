@@ -1,15 +1,13 @@
 !> Simple outlines: corners of rectangles and rings, and how convex outlines lie relative to each other.
 module polydem_outlines
-   use polydem_elementary, only: hypotenuse, sine_and_cosine
+   use polydem_elementary, only: hypotenuse, sine_and_cosine, pi
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: cross, mass_properties
    implicit none
    private
-   public :: rectangle, draw_ring, pi, are_apart, inner_circle, inner_circle_t, lies, contains_point, distance_to, &
+   public :: rectangle, draw_ring, are_apart, inner_circle, inner_circle_t, lies, contains_point, distance_to, &
       as_corners, is_apart, is_inside, is_across
 
-   !> The number pi
-   real(wp), parameter :: pi = 3.141592653589793238462643383279503_wp
    !> How a polygon lies relative to an outline: beside it, inside, or across its border
    integer, parameter :: is_apart = 1, is_inside = 2, is_across = 3
 

@@ -3,11 +3,10 @@
 !> The copies lie side by side and on top of each other. Only grains wholly inside the container are used, from the
 !> lowest to the highest. Time and memory are proportional to the number of grains.
 module polydem_packing
-   use polydem_elementary, only: hypotenuse
+   use polydem_elementary, only: hypotenuse, pi
    use polydem_errors, only: error_t
    use polydem_grain_list, only: grain_t, grains_t
    use polydem_kinds, only: ip, wp
-   use polydem_outlines, only: pi
    use polydem_patch, only: patch_t, read_patch
    use polydem_settings, only: motion_settings_t
    implicit none
@@ -116,7 +115,7 @@ contains
 
       do k = 1, size(motions)
          associate (motion => motions(k))
-            if (motion%kind /= 'rotation' .or. max(motion%start, motion%ramp) > 0.0_wp) cycle
+            if (max(motion%start, motion%ramp) > 0.0_wp) cycle
             if (motion%stage /= '') cycle
             if (motion%wall /= '' .and. wall /= '' .and. motion%wall /= wall) cycle
             rate = 2.0_wp*pi*motion%rate

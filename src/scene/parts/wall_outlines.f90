@@ -1,9 +1,9 @@
 !> The bodies of a wall: convex polygons that follow from its outline.
 module polydem_wall_outlines
-   use polydem_elementary, only: cosine, hypotenuse, sine
+   use polydem_elementary, only: cosine, hypotenuse, sine, pi
    use polydem_kinds, only: ip, wp
    use polydem_namelist_values, only: list_text
-   use polydem_outlines, only: as_corners, draw_ring, pi, rectangle
+   use polydem_outlines, only: as_corners, draw_ring, rectangle
    use polydem_polygon, only: clean_polygon, cross
    use polydem_polygon_list, only: polygon_list_t
    use polydem_settings, only: wall_settings_t

@@ -7,6 +7,7 @@ module polydem_choose_methods
    use polydem_law_factory, only: choose_parts
    use polydem_new_neighbours, only: choose_finder
    use polydem_pair_parameters, only: pair_parameters
+   use polydem_participants, only: choose_participants
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_new_traffic, only: new_traffic
@@ -16,7 +17,7 @@ module polydem_choose_methods
 
 contains
 
-   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks.
+   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks, participants.
    subroutine choose_methods(self, error)
       !> The simulation with its settings, and with the parameters of its first stage
       type(simulation_t), intent(inout) :: self
@@ -34,6 +35,7 @@ contains
                             self%bodies%isa)
          call choose_all_fields(settings, self%stages%drag, self%body_forces)
       end associate
+      call choose_participants(self)
    end subroutine choose_methods
 
    !> Choose the forces that are no contacts: those of any stage, with the parameters of the strongest.

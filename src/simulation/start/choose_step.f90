@@ -3,6 +3,7 @@ module polydem_choose_step
    use polydem_begin_stage, only: find_last_steps
    use polydem_bodies, only: bodies_t
    use polydem_cell_load, only: set_cell_mass
+   use polydem_elementary, only: two_pi
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, sum_exactly
    use polydem_kinds, only: ip, lp, wp
@@ -21,8 +22,6 @@ module polydem_choose_step
    real(wp), parameter :: most_steps = 1.0e15_wp
    !> Greatest change of a velocity in a step by a force that is no contact, as a share
    real(wp), parameter :: greatest_change = 0.1_wp
-   !> Angle of a full turn [rad]
-   real(wp), parameter :: two_pi = 6.283185307179586_wp
 
 contains
 
@@ -133,9 +132,9 @@ contains
       if (allocated(error) .or. .not. allocated(self%bodies%cell%load)) return
       associate (cell => self%bodies%cell)
          least = (least_steps*self%dt)**2*self%settings%forces%stiffness*maxval(cell%size)/minval(cell%size)
-         if (cell%load%mass >= least) return
+         if (cell%load%axis(1)%mass >= least) return
          call raise(error, input_error, place_of(self%settings, 'cell', 'mass')//': ''mass'' in &cell: the size '// &
-                    'of a cell of '//to_text(cell%load%mass)//' kg/m oscillates faster than the time step '// &
+                    'of a cell of '//to_text(cell%load%axis(1)%mass)//' kg/m oscillates faster than the time step '// &
                     'resolves; use at least '//to_text(short_number(least*1.1_wp))//' kg/m')
       end associate
    end subroutine check_cell_mass

@@ -3,16 +3,15 @@ module polydem_enter_cell
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_bodies_in_cell, only: add_profile, find_folds, put_into_cell, set_cell
    use polydem_cell, only: cell_t, new_cell
+   use polydem_driven, only: along_angle, new_window
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
-   use polydem_motion_table, only: greatest_values
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: cell_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
-   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: enter_cell, join_copies, check_constraint
@@ -95,7 +94,7 @@ contains
       call put_into_cell(bodies, slots)
       if (.not. settings%profile) return
       associate (cell => bodies%cell)
-         rate = merge(0.0_wp, cell%rate, cell%ramp > 0.0_wp)
+         rate = merge(0.0_wp, cell%rate, cell%window%ramp > 0.0_wp)
          if (abs(rate*cell%size(2) - cell%former_jump) > 0.0_wp) &
             call add_profile(bodies, rate - cell%former_jump/cell%size(2), slots)
       end associate
@@ -113,12 +112,11 @@ contains
             load%yields(axis) = scan(given%obeys, 'xy'(axis:axis)) > 0
          end do
          load%stress = given%stress
-         load%ramp = given%stress_ramp
-         load%mass = given%mass
-         load%damping_ratio = given%damping_ratio
+         load%axis%window_t = new_window(0.0_wp, 0.0_wp, given%stress_ramp, number_of_stage(settings, given%stage))
+         load%axis%mass = given%mass
+         load%axis%damping_ratio = given%damping_ratio
+         load%axis%place = cell%size
          load%centre = cell%low + 0.5_wp*cell%size
-         load%stage = number_of_stage(settings, given%stage)
-         if (load%stage > 0_ip) load%start = huge(1.0_wp)
       end associate
    end subroutine let_yield
 
@@ -223,12 +221,12 @@ contains
          do k = 1_ip, size(self%walls%driven(w)%slots, kind=ip)
             associate (s => self%walls%driven(w)%slots(k), bodies => self%bodies)
                if (allocated(error)) return
-               if (turns(self, w, s)) call refuse(self, s, 'turns, which its copies do not; leave out the angles '// &
-                  'of its table of motion, and loads along ''angle''', error)
+               if (moves(self, w, s, along_angle)) call refuse(self, s, 'turns, which its copies do not; leave out '// &
+                  'the angles of its table of motion, and loads along ''angle''', error)
                do axis = 1, 2
                   if (allocated(error)) return
                   if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%folds(axis, s) > 0.0_wp) cycle
-                  if (moves_along(self, w, s, axis)) call refuse(self, s, 'spans the cell and cannot move along '// &
+                  if (moves(self, w, s, axis)) call refuse(self, s, 'spans the cell and cannot move along '// &
                      name(axis)//'; use a conveyor, or make it of bodies that are shorter than half the cell, for '// &
                      'example with outline = ''row'' in &wall', error)
                end do
@@ -237,43 +235,21 @@ contains
       end do
    end subroutine check_walls
 
-   !> Whether a fixed body of a wall turns by a table or a load. Motions of the kind rotation are refused before.
-   pure logical function turns(self, w, s)
+   !> Whether a motion or a load moves a fixed body of a wall along a direction, 1, 2 or `along_angle`
+   pure logical function moves(self, w, s, direction)
       type(simulation_t), intent(in) :: self
       !> Number of the wall
       integer, intent(in) :: w
       !> Slot of the body
       integer(ip), intent(in) :: s
-      real(wp) :: values(3)
+      integer, intent(in) :: direction
       integer :: m
 
-      turns = is_loaded(self, s, along_angle)
+      moves = is_loaded(self, s, direction)
       do m = 1, size(self%walls%driven(w)%motions)
-         if (.not. allocated(self%walls%driven(w)%motions(m)%table)) cycle
-         values = greatest_values(self%walls%driven(w)%motions(m)%table)
-         turns = turns .or. values(3) > 0.0_wp
+         moves = moves .or. self%walls%driven(w)%motions(m)%motion%moves(direction)
       end do
-   end function turns
-
-   !> Whether a fixed body of a wall changes its place along an axis. The bodies of a conveyor stay.
-   pure logical function moves_along(self, w, s, axis)
-      type(simulation_t), intent(in) :: self
-      integer, intent(in) :: w
-      integer(ip), intent(in) :: s
-      integer, intent(in) :: axis
-      real(wp) :: values(3)
-      integer :: m
-
-      moves_along = is_loaded(self, s, axis)
-      do m = 1, size(self%walls%driven(w)%motions)
-         associate (motion => self%walls%driven(w)%motions(m))
-            if (motion%kind == 'conveyor') cycle
-            values = 0.0_wp
-            if (allocated(motion%table)) values = greatest_values(motion%table)
-            if (abs(motion%velocity(axis)) + abs(motion%amplitude(axis)) + values(axis) > 0.0_wp) moves_along = .true.
-         end associate
-      end do
-   end function moves_along
+   end function moves
 
    !> Whether a load displaces a body along a direction, 1, 2 or `along_angle`
    pure logical function is_loaded(self, s, direction)

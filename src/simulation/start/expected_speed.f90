@@ -7,7 +7,7 @@
 module polydem_expected_speed
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_elementary, only: hypotenuse
+   use polydem_elementary, only: hypotenuse, pi
    use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
    use polydem_kinds, only: ip, wp
    use polydem_run_duration, only: longest_run
@@ -18,8 +18,6 @@ module polydem_expected_speed
    private
    public :: find_expected_speed
 
-   !> The number pi
-   real(wp), parameter :: pi = 3.141592653589793_wp
 
 contains
 

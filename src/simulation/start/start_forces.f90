@@ -1,8 +1,6 @@
 !> Forces and accelerations at time 0.
 module polydem_start_forces
    use polydem_bodies, only: bodies_t
-   use polydem_cell_load, only: yield_cell
-   use polydem_changed_bodies, only: expect_changes
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
@@ -10,7 +8,8 @@ module polydem_start_forces
    use polydem_force_sums, only: force_sums_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: wp
-   use polydem_simulation, only: present_gravity, simulation_t, time_of
+   use polydem_participants, only: follow_forces, start_participants
+   use polydem_simulation, only: simulation_t
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
    implicit none
@@ -32,16 +31,11 @@ contains
       if (allocated(error)) return
       call start_integration(self%settings%forces%gravity, self%loop%force_sums, self%bodies, self%motion%integrator, &
                              self%history)
-      if (allocated(self%walls%loads)) call self%walls%yield(self%comm, 0.0_wp, time_of(self), &
-                                                                present_gravity(self), self%bodies, self%loop%walls)
-      if (allocated(self%bodies%cell%load)) &
-         call yield_cell(self%comm, 0.0_wp, time_of(self), self%loop%virial, self%bodies%cell)
-      if (self%settings%output%series_interval > 0.0_wp) &
-         call self%walls%record%start(self%walls%named, self%bodies, self%loop%walls)
+      call follow_forces(self, 0.0_wp)
       if (self%settings%output%energy_balance) call start_energy_balance( &
          self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%loop%force_sums, &
          self%loop%walls)
-      if (allocated(self%traffic)) call expect_changes(self%energy_balance)
+      call start_participants(self)
       self%timers = timers_t()
    end subroutine start_forces
 

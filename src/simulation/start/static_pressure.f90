@@ -4,6 +4,7 @@
 !> greatest; the stress of a load, or its force over the width of its wall, with the weight of a wall whose mass is
 !> given; and the stress that a cell obeys. It is that of the bodies at the start.
 module polydem_static_pressure
+   use polydem_driven, only: along_angle
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
@@ -12,7 +13,6 @@ module polydem_static_pressure
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
-   use polydem_wall_load, only: along_angle
    implicit none
    private
    public :: find_static_pressure, choose_stiffness, load_pressure

@@ -3,14 +3,12 @@
 module polydem_wall
    use polydem_bodies, only: bodies_t
    use polydem_elementary, only: hypotenuse
-   use polydem_hash, only: mix_word
-   use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_motion_table, only: greatest_rates, greatest_values
-   use polydem_prescribed_motion, only: carry_bodies, motion_t, pose_bodies, starts_from_reference
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_motion, only: carry_bodies, motion_item_t, pose_bodies
    use polydem_sort, only: place_in
    implicit none
    private
-   public :: wall_t, new_wall, move_wall, find_slots, greatest_wall_speed, has_table, hash_of_tables
+   public :: wall_t, new_wall, move_wall, find_slots, greatest_wall_speed, hash_of_tables
 
    !> A wall with prescribed motions, or with loads
    type :: wall_t
@@ -21,7 +19,7 @@ module polydem_wall
       !> Their angles before all motions [rad]
       real(wp), allocatable :: angle(:)
       !> Motions, of which each one moves what the motions before it have moved
-      type(motion_t), allocatable :: motions(:)
+      type(motion_item_t), allocatable :: motions(:)
       !> Whether loads displace it from where the motions place it
       logical :: is_loaded = .false.
    end type wall_t
@@ -29,20 +27,24 @@ module polydem_wall
 contains
 
    !> Make a wall of some bodies from their present positions and angles.
-   pure subroutine new_wall(wall, motions, bodies, slots)
+   subroutine new_wall(wall, motions, bodies, slots)
       !> The wall
       type(wall_t), intent(out) :: wall
       !> Its motions in their order
-      type(motion_t), intent(in) :: motions(:)
+      type(motion_item_t), intent(in) :: motions(:)
       !> All bodies
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies of the wall
       integer(ip), intent(in) :: slots(:)
+      integer :: k
 
       wall%slots = slots
       wall%position = bodies%position(:, slots)
       wall%angle = bodies%angle(slots)
-      wall%motions = motions
+      allocate (wall%motions(size(motions)))
+      do k = 1, size(motions)
+         allocate (wall%motions(k)%motion, source=motions(k)%motion)
+      end do
    end subroutine new_wall
 
    !> Find the bodies of a wall again after bodies have changed their slots. Bodies that are gone leave the wall.
@@ -78,18 +80,20 @@ contains
 
       if (size(wall%motions) /= 1 .or. wall%is_loaded) then
          call reset_bodies(wall, bodies)
-      else if (.not. starts_from_reference(wall%motions(1))) then
+      else if (.not. wall%motions(1)%motion%starts_from_reference()) then
          call reset_bodies(wall, bodies)
       end if
       is_moved = .false.
       do k = 1, size(wall%motions)
-         if (time < wall%motions(k)%start) cycle
-         if (is_moved .or. .not. starts_from_reference(wall%motions(k))) then
-            call carry_bodies(wall%motions(k), time, wall%slots, bodies)
-         else
-            call pose_bodies(wall%motions(k), time, wall%slots, wall%position, wall%angle, bodies)
-         end if
-         is_moved = .true.
+         associate (motion => wall%motions(k)%motion)
+            if (time < motion%start) cycle
+            if (is_moved .or. .not. motion%starts_from_reference()) then
+               call carry_bodies(motion, time, wall%slots, bodies)
+            else
+               call pose_bodies(motion, time, wall%slots, wall%position, wall%angle, bodies)
+            end if
+            is_moved = .true.
+         end associate
       end do
    end subroutine move_wall
 
@@ -111,29 +115,14 @@ contains
       end do
    end subroutine reset_bodies
 
-   !> Whether one of the motions of a wall follows a table
-   pure logical function has_table(wall)
-      type(wall_t), intent(in) :: wall
-
-      has_table = any(wall%motions%kind == 'table')
-   end function has_table
-
-   !> Hash of the tables of the motions of a wall
+   !> Hash of the tables of the motions of a wall; 0 if there are none
    pure integer(lp) function hash_of_tables(wall) result(hash)
       type(wall_t), intent(in) :: wall
-      integer :: i, j, k
+      integer :: k
 
       hash = 0_lp
       do k = 1, size(wall%motions)
-         if (.not. allocated(wall%motions(k)%table)) cycle
-         associate (table => wall%motions(k)%table)
-            do j = 1, size(table%time)
-               hash = mix_word(hash, transfer(real(table%time(j), dp), 0_lp))
-               do i = 1, 3
-                  hash = mix_word(hash, transfer(real(table%value(i, j), dp), 0_lp))
-               end do
-            end do
-         end associate
+         hash = wall%motions(k)%motion%hash_of_table(hash)
       end do
    end function hash_of_tables
 
@@ -144,36 +133,14 @@ contains
       real(wp), intent(in) :: radius(:)
       !> Duration of the run, in which a motion can move a body away from the pivot of the next one [s]
       real(wp), intent(in) :: duration
-      real(wp) :: arm, reach, rates(3), values(3)
+      real(wp) :: reach
       integer :: k
 
       speed = 0.0_wp
       reach = 0.0_wp
       do k = 1, size(wall%motions)
-         associate (motion => wall%motions(k))
-            select case (motion%kind)
-            case ('rotation')
-               arm = greatest_arm(motion%pivot)
-               speed = speed + abs(motion%rate)*(arm + reach)
-               reach = reach + 2.0_wp*(arm + reach)
-            case ('translation')
-               speed = speed + hypotenuse(motion%velocity(1), motion%velocity(2))
-               ! The start of a motion in a stage is not known yet.
-               reach = reach + hypotenuse(motion%velocity(1), motion%velocity(2)) &
-                       *max(0.0_wp, min(duration, motion%end) - merge(0.0_wp, motion%start, motion%stage > 0_ip))
-            case ('conveyor')
-               speed = speed + hypotenuse(motion%velocity(1), motion%velocity(2))
-            case ('table')
-               rates = greatest_rates(motion%table)
-               values = greatest_values(motion%table)
-               arm = greatest_arm(motion%pivot)
-               speed = speed + rates(3)*(arm + reach) + hypotenuse(rates(1), rates(2))
-               if (values(3) > 0.0_wp) reach = reach + 2.0_wp*(arm + reach)
-               reach = reach + hypotenuse(values(1), values(2))
-            case default
-               speed = speed + motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
-               reach = reach + hypotenuse(motion%amplitude(1), motion%amplitude(2))
-            end select
+         associate (motion => wall%motions(k)%motion)
+            call motion%add_bounds(greatest_arm(motion%pivot), duration, speed, reach)
          end associate
       end do
 

@@ -13,29 +13,50 @@ module polydem_vanishing_walls
    use polydem_force_sums, only: sum_energy
    use polydem_kinds, only: ip, wp
    use polydem_replace_bodies, only: hold_history, settle_bodies
-   use polydem_simulation, only: simulation_t, time_of
+   use polydem_serializer, only: serializer_t
+   use polydem_simulation, only: participant_t, simulation_t, time_of
    use polydem_wall_energy, only: release_energy
    implicit none
    private
-   public :: remove_walls, find_release
+   public :: vanishing_walls_t, find_release
+
+   !> Walls that vanish at a time
+   type, extends(participant_t) :: vanishing_walls_t
+   contains
+      procedure :: change_bodies
+      procedure :: serialize
+   end type vanishing_walls_t
 
 contains
 
-   !> Remove the walls that vanish at the present time, before a step. Collective; all ranks get the same error.
-   subroutine remove_walls(self, error)
-      !> The simulation between two steps
-      type(simulation_t), intent(inout) :: self
-      !> Allocated if what depends on the bodies cannot be built anew
+   !> Remove the walls that vanish at the present time.
+   subroutine change_bodies(self, simulation, error)
+      class(vanishing_walls_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. self%walls%named%any_vanishes(time_of(self))) return
-      call find_release(self)
-      call release_energy(self%energy_balance, self%walls%named%released)
-      self%walls%named%released = 0.0_wp
-      call hold_history(self)
-      where (self%walls%named%vanishing(time_of(self))) self%walls%named%wall%is_gone = .true.
-      call settle_bodies(self, error)
-   end subroutine remove_walls
+      associate (unused => self, named => simulation%walls%named)
+         if (.not. named%any_vanishes(time_of(simulation))) return
+         call find_release(simulation)
+         call release_energy(simulation%energy_balance, named%released)
+         named%released = 0.0_wp
+         call hold_history(simulation)
+         where (named%vanishing(time_of(simulation))) named%wall%is_gone = .true.
+         call settle_bodies(simulation, error)
+      end associate
+   end subroutine change_bodies
+
+   !> Serialize which walls have vanished, and the energy of those that vanish before the next step.
+   subroutine serialize(self, simulation, serializer)
+      class(vanishing_walls_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      class(serializer_t), intent(inout) :: serializer
+
+      associate (unused => self)
+      end associate
+      if (.not. serializer%is_reading) call find_release(simulation)
+      call simulation%walls%named%serialize_gates(serializer)
+   end subroutine serialize
 
    !> Find the elastic energy of the contacts of walls that vanish before the next step, unless a restart has read it.
    !> Collective.

@@ -1,12 +1,12 @@
 !> Reads the table of a motion from a CSV file: a header that names columns, then one row per time.
-module polydem_motion_file
+module polydem_table_file
+   use polydem_elementary, only: pi
    use polydem_errors, only: error_t, input_error, raise, raise_unread
    use polydem_file_status, only: is_stream
    use polydem_file_system, only: exists, is_folder
    use polydem_kinds, only: ip, wp
    use polydem_motion_table, only: greatest_rates, motion_table_t, prepare_table
    use polydem_namelist_values, only: is_readable
-   use polydem_outlines, only: pi
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: index_of, lower_case, printable, quoted, to_text
@@ -223,4 +223,4 @@ contains
       first = first + length + 1
    end subroutine next_field
 
-end module polydem_motion_file
+end module polydem_table_file

@@ -1,0 +1,66 @@
+!> Sources and sinks as a participant of the steps.
+module polydem_sources_and_sinks
+   use polydem_changed_bodies, only: expect_changes
+   use polydem_errors, only: error_t
+   use polydem_exchange_bodies, only: exchange_bodies, find_leaving
+   use polydem_serializer, only: serializer_t
+   use polydem_simulation, only: participant_t, simulation_t
+   implicit none
+   private
+   public :: sources_and_sinks_t
+
+   !> Sources and sinks; their state is `traffic` of the simulation
+   type, extends(participant_t) :: sources_and_sinks_t
+   contains
+      procedure :: start
+      procedure :: change_bodies
+      procedure :: needs_table
+      procedure :: serialize
+   end type sources_and_sinks_t
+
+contains
+
+   !> Prepare the balance for bodies that enter and leave.
+   subroutine start(self, simulation)
+      class(sources_and_sinks_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      associate (unused => self)
+      end associate
+      call expect_changes(simulation%energy_balance)
+   end subroutine start
+
+   !> Let bodies leave and enter.
+   subroutine change_bodies(self, simulation, error)
+      class(sources_and_sinks_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused => self)
+      end associate
+      call exchange_bodies(simulation, error)
+   end subroutine change_bodies
+
+   !> Whether bodies leave behind this step: the elastic energy of their contacts leaves with them
+   pure logical function needs_table(self, simulation)
+      class(sources_and_sinks_t), intent(in) :: self
+      type(simulation_t), intent(in) :: simulation
+
+      associate (unused => self)
+      end associate
+      needs_table = simulation%traffic%has_departures(simulation%step)
+   end function needs_table
+
+   !> Serialize the state of all sources and sinks.
+   subroutine serialize(self, simulation, serializer)
+      class(sources_and_sinks_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      class(serializer_t), intent(inout) :: serializer
+
+      associate (unused => self)
+      end associate
+      if (.not. serializer%is_reading) call find_leaving(simulation)
+      call simulation%traffic%serialize(simulation%step, serializer)
+   end subroutine serialize
+
+end module polydem_sources_and_sinks
