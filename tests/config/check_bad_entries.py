@@ -232,7 +232,7 @@ def call(program, folder, case, verb, *more):
         settings[case.name] = case.value
     path = Path(folder) / "case.nml"
     path.write_text(namelist(settings), encoding="utf-8")
-    command = [program, verb, str(path), *more]
+    command = [program + "_lab" * (verb == "bench"), verb, str(path), *more]
     if case.is_override:
         command += ["--set", f"{case.name}={case.value}"]
     began = time.monotonic()

@@ -15,7 +15,6 @@ import unittest
 from pathlib import Path
 
 LAUNCHER = Path()
-PLACES = ("src/app/help", "postproc/src/polydem_post/command_line/help", "postproc/src/polydem_lab/command_line/help")
 
 
 def call(*words, text=None):
