@@ -3,6 +3,8 @@
 make_entries.py ENTRIES.txt FOLDER: the Fortran sources entry_table.f90 (the table as constants), settings.f90 (one type
 per group), fill_groups.f90 (fills these types) and pair_entries.f90 (numbers that pairs of materials may have).
 make_entries.py ENTRIES.txt FOLDER --pairs: pair_values.f90, the type of these numbers in a force law.
+make_entries.py ENTRIES.txt FOLDER --alone: of a table with one group NAME, which is no group of a run, NAME_table.f90,
+NAME_settings.f90 and fill_NAME.f90.
 make_entries.py ENTRIES.txt PAGE.md [--check]: the table of the manual, between the lines <!-- entries --> and
 <!-- /entries -->; with --check it must be there already.
 """
@@ -26,8 +28,6 @@ NAME_ROW = ("name", "name", 1, "required", "", "", "")
 #: A usual range with what may have been meant by a value outside it
 BOUND = r"(?:>=|>|<=|<|multiple_of) [-+.0-9e]+"
 USUAL = re.compile(rf"{BOUND}(?:(?:, | or | / ){BOUND})*: .+")
-#: Group of a bench; all other groups belong to a run
-BENCH = "bench"
 #: Groups that a recipe makes, which --expand prints
 PARTS = ("grains", "wall")
 #: Groups that have the numbers of &forces that are mixed, and how they say it
@@ -43,8 +43,8 @@ class TableError(Exception):
     """A table that cannot be understood."""
 
 
-def read_table(text):
-    """Groups by name, and all rows."""
+def read_table(text, folder=Path()):
+    """Groups by name, and all rows, of a table in a folder."""
     groups, lists, rows, blocks, block = {}, {}, [], {}, ""
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
@@ -64,8 +64,9 @@ def read_table(text):
             groups[name] = groups[name]._replace(block=rest, rows=blocks[rest].rows)
             rows += [row._replace(group=name) for row in blocks[rest].rows]
         elif word == "list":
-            name, _, words = rest.partition(" = ")
-            lists[name] = with_lists(words.strip(), lists, number)
+            read_lists([line], lists, number)
+        elif word == "lists":
+            read_lists((folder / rest).read_text(encoding="utf-8").splitlines(), lists, number)
         elif block:
             earlier = blocks[block].rows
             blocks[block] = blocks[block]._replace(rows=(*earlier, read_row(line, lists, number, blocks, earlier)))
@@ -76,6 +77,15 @@ def read_table(text):
         if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
             raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def read_lists(lines, lists, number):
+    """Add the lists among some lines."""
+    for line in lines:
+        word, _, rest = line.partition(" ")
+        if word == "list":
+            name, _, words = rest.partition(" = ")
+            lists[name] = with_lists(words.strip(), lists, number)
 
 
 def read_row(line, lists, number, groups, earlier):
@@ -169,7 +179,7 @@ def module(name, purpose, uses, public, body, contains=""):
     return "\n".join([*lines, "", f"end module polydem_{name}", ""])
 
 
-def table_module(groups, rows):
+def table_module(groups, rows, name="entry_table"):
     """The table as constants, one per group: a statement cannot have more than 255 lines."""
     body = ""
     for group in groups:
@@ -186,11 +196,7 @@ def table_module(groups, rows):
                  + ", &\n".join(entries) + "]\n\n")
     names = ", &\n      ".join(f"{group}_entries" for group in groups)
     body += f"   !> The table of entries\n   type(entry_t), parameter :: entries(*) = [ &\n      {names}]\n\n"
-    names = "".join(f", &\n      '{name}'" for name, group in groups.items() if group.is_repeatable)[1:]
-    body += ("   !> Groups that a file may contain several times\n"
-             "   character(len=*), parameter :: repeatable_groups(*) = [character(len=group_length) ::" + names + "]\n")
-    return module("entry_table", "Table of namelist entries.",
-                  ["namelist_entry, only: entry_t, group_length, required"], ["entries", "repeatable_groups"], body)
+    return module(name, "Table of namelist entries.", ["namelist_entry, only: entry_t, required"], ["entries"], body)
 
 
 def component(row):
@@ -208,8 +214,8 @@ def component(row):
     return f"{comment}\n      {kind} :: {row.key}{f'({row.count})' if row.count > 1 else ''} = {zero}"
 
 
-def settings_module(groups, rows):
-    """One type per group, one of all groups of a run, and one of a bench."""
+def group_types(groups, rows, base=""):
+    """One type per block and per group."""
     body = ""
     blocks = {group.block: group.rows for group in groups.values() if group.block}
     for block, members in blocks.items():
@@ -221,18 +227,23 @@ def settings_module(groups, rows):
         components = "\n".join(component(row) for row in first_rows(rows, group) if row.key not in common)
         comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
                                 initial_indent="   !> ", subsequent_indent="   !> ")
-        base = ", extends(source_locations_t)" if group == BENCH else ""
-        base = f", extends({block}_settings_t)" if block else base
-        body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
+        kind = f", extends({block}_settings_t)" if block else base
+        body += f"{comment}\n   type{kind} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
+    return body
+
+
+def settings_module(groups, rows):
+    """One type per group, and one of all groups."""
+    body = group_types(groups, rows)
     body += "   !> All settings of a run. They do not change after reading\n"
     body += "   type, extends(source_locations_t) :: settings_t\n"
     for group, (_, is_repeatable, *_) in groups.items():
-        if group != BENCH:
-            kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
-            body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
-                     f"      type({group}_settings_t){kind} :: {group}{shape}\n")
+        kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
+        body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
+                 f"      type({group}_settings_t){kind} :: {group}{shape}\n")
     body += "   end type settings_t\n"
-    return module("settings", "Settings of a run and of a bench: one type per namelist group.",
+    blocks = dict.fromkeys(group.block for group in groups.values() if group.block)
+    return module("settings", "Settings of a run: one type per namelist group.",
                   ["kinds, only: ip, wp", "source_locations, only: source_locations_t", "strings, only: text_t"],
                   ["settings_t", *(f"{name}_settings_t" for name in (*blocks, *groups))], body)
 
@@ -256,11 +267,19 @@ def storage(row):
     return f"      call store_value(instance, '{row.key}', {kinds.get(row.type, 'text')}={value})\n"
 
 
+def fill_procedure(rows, group):
+    """The procedure that fills the type of a group."""
+    copies = "".join(assignment(row) for row in first_rows(rows, group))
+    return (f"   !> Fill a group &{group}.\n   pure subroutine fill_{group}(instance, settings)\n"
+            "      !> The group with its values\n      type(instance_t), intent(in) :: instance\n"
+            f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
+            f"{copies}   end subroutine fill_{group}\n")
+
+
 def fill_module(groups, rows):
-    """Procedures that fill the types, one per group, and the one that fills all groups of a run."""
-    run = [group for group in groups if group != BENCH]
+    """Procedures that fill the types, one per group, and the one that fills all groups."""
     allocations, cases = "", ""
-    for group in run:
+    for group in groups:
         place = ""
         if groups[group].is_repeatable:
             place = "(instances(k)%number)"
@@ -272,12 +291,7 @@ def fill_module(groups, rows):
              "      !> Settings to fill\n      type(settings_t), intent(inout) :: settings\n      integer :: k\n\n"
              f"{allocations}      do k = 1, size(instances)\n         select case (instances(k)%group)\n{cases}"
              "         end select\n      end do\n   end subroutine fill_groups\n"]
-    for group in groups:
-        copies = "".join(assignment(row) for row in first_rows(rows, group))
-        parts.append(f"   !> Fill a group &{group}.\n   pure subroutine fill_{group}(instance, settings)\n"
-                     "      !> The group with its values\n      type(instance_t), intent(in) :: instance\n"
-                     f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
-                     f"{copies}   end subroutine fill_{group}\n")
+    parts += [fill_procedure(rows, group) for group in groups]
     for group in (group for group in PARTS if group in groups):
         copies = "".join(storage(row) for row in first_rows(rows, group))
         parts.append(f"   !> Store a group &{group} in the values of an instance.\n"
@@ -290,8 +304,22 @@ def fill_module(groups, rows):
     used = f"group_instances, only: instance_t, row_of{', store_value' * bool(stores)}"
     return module("fill_groups", "Copies the values of the table of entries to the settings, and those of parts back.",
                   [used, "settings, only: settings_t", *uses],
-                  ["fill_groups", f"fill_{BENCH}", *stores], "",
-                  "\n".join(parts))
+                  ["fill_groups", *stores], "", "\n".join(parts))
+
+
+def lone_modules(groups, rows):
+    """Table, settings and filling of a group that is none of a run."""
+    (name,) = groups
+    body = group_types(groups, rows, ", extends(source_locations_t)")
+    kinds = ", ".join(kind for kind in ("ip", "wp") if f"({kind})" in body)
+    settings = module(f"{name}_settings", f"Settings of a {name}.",
+                      [f"kinds, only: {kinds}", "source_locations, only: source_locations_t", "strings, only: text_t"],
+                      [f"{name}_settings_t"], body)
+    fill = module(f"fill_{name}", "Copies the values of the table of entries to the settings.",
+                  [f"{name}_settings, only: {name}_settings_t", "group_instances, only: instance_t, row_of"],
+                  [f"fill_{name}"], "", fill_procedure(rows, name))
+    return {f"{name}_table": table_module(groups, rows, f"{name}_table"), f"{name}_settings": settings,
+            f"fill_{name}": fill}
 
 
 def pair_module(rows):
@@ -402,7 +430,7 @@ def update_manual(page, rows, checks):
 def main(table, target, *options):
     """Write the sources or the manual."""
     try:
-        groups, rows = read_table(Path(table).read_text(encoding="utf-8"))
+        groups, rows = read_table(Path(table).read_text(encoding="utf-8"), Path(table).parent)
     except TableError as error:
         sys.exit(f"{table}: {error}")
     if target.endswith(".md"):
@@ -410,6 +438,8 @@ def main(table, target, *options):
         return
     if "--pairs" in options:
         made = {"pair_values": value_module(rows)}
+    elif "--alone" in options:
+        made = lone_modules(groups, rows)
     else:
         made = {"entry_table": table_module(groups, rows), "settings": settings_module(groups, rows),
                 "fill_groups": fill_module(groups, rows), "pair_entries": pair_module(rows)}

@@ -1,5 +1,5 @@
-!> Start and end of a program as a process among others, and its answer to --help and --version. Only the end of a program
-!> stops it.
+!> Start and end of a program as a process among others, and its answer to --help and --version. Only the end of a
+!> program stops it.
 module polydem_process
    use, intrinsic :: iso_c_binding, only: c_int
    use polydem_build_info, only: git_revision, program_version

@@ -1,11 +1,12 @@
 !> The command line of the program `polydem_lab`: its verbs and options.
 module polydem_lab_command
+   use polydem_bench_table, only: entries
    use polydem_command_line, only: command_t, option_t, verb_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_lab_help_texts, only: texts => help_text
-   use polydem_namelist_entries, only: choices_of
+   use polydem_namelist_entries, only: row_in
    use polydem_option_values, only: read_count
-   use polydem_strings, only: suggestion
+   use polydem_strings, only: split_words, suggestion
    implicit none
    private
    public :: lab_command_t
@@ -72,8 +73,10 @@ contains
       select case (name)
       case ('--finder')
          self%finder = value
-         if (all(choices_of('bench', 'finders') /= value)) call raise(error, input_error, '--finder '// &
-            value//': there is no such finder'//suggestion(value, choices_of('bench', 'finders')))
+         associate (finders => split_words(entries(row_in(entries, 'bench', 'finders'))%allowed))
+            if (all(finders /= value)) call raise(error, input_error, '--finder '//value// &
+               ': there is no such finder'//suggestion(value, finders))
+         end associate
       case ('--repeat')
          call read_count('--repeat', value, self%repeat, error)
       case ('--steps')

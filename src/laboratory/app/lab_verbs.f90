@@ -2,6 +2,7 @@
 module polydem_lab_verbs
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_thread_limit, omp_set_num_threads
    use polydem_bench, only: run_bench
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_communicator, only: communicator_t
    use polydem_console, only: warn
    use polydem_errors, only: error_t
@@ -10,9 +11,8 @@ module polydem_lab_verbs
    use polydem_oversubscription, only: oversubscription_text
    use polydem_process, only: answer_question
    use polydem_process_limits, only: check_threads
-   use polydem_read_settings, only: read_settings
+   use polydem_read_bench, only: read_bench
    use polydem_replay, only: replay_trace
-   use polydem_settings, only: bench_settings_t
    use polydem_signals, only: release_signals
    implicit none
    private
@@ -40,14 +40,14 @@ contains
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
                            int(command%steps, ip), command%samples, command%oracle)
       else
-         call read_settings(command%file, command%overrides, bench, error)
+         call read_bench(command%file, command%overrides, bench, error)
          if (.not. allocated(error)) call check_threads(maxval(bench%threads), error)
          if (.not. allocated(error)) call run_bench(bench, error)
       end if
    end subroutine execute
 
-   !> Set the number of OpenMP threads, and check it against system limits: that of a replay from the command line, that of
-   !> a bench outside its samples from OMP_NUM_THREADS.
+   !> Set the number of OpenMP threads, and check it against system limits: that of a replay from the command line, that
+   !> of a bench outside its samples from OMP_NUM_THREADS.
    subroutine set_threads(command, error)
       type(lab_command_t), intent(in) :: command
       type(error_t), allocatable, intent(inout) :: error
