@@ -1,25 +1,23 @@
-!> The verbs of the program.
+!> The verbs of runs.
 module polydem_verbs
-   use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_thread_limit, omp_set_num_threads
-   use polydem_bench, only: run_bench
-   use polydem_build_info, only: git_revision, program_version
+   use omp_lib, only: omp_get_max_threads, omp_get_thread_limit, omp_set_num_threads
    use polydem_check, only: check_simulation
    use polydem_check_result, only: check_result
-   use polydem_command_line, only: command_t, usage
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
    use polydem_expand, only: expand_scene
    use polydem_host, only: environment
    use polydem_kinds, only: dp, ip
-   use polydem_oversubscription, only: oversubscription, oversubscription_text
+   use polydem_oversubscription, only: oversubscription
+   use polydem_process, only: answer_question
    use polydem_process_limits, only: check_threads
    use polydem_read_settings, only: read_settings
-   use polydem_replay, only: replay_trace
    use polydem_result_info, only: describe_program, describe_result
    use polydem_run, only: run_options_t
+   use polydem_run_command, only: run_command_t
    use polydem_run_simulation, only: run_simulation
-   use polydem_console, only: print_line, warn
-   use polydem_settings, only: bench_settings_t, settings_t
+   use polydem_console, only: print_line
+   use polydem_settings, only: settings_t
    use polydem_signals, only: release_signals
    use polydem_thread_choice, only: thread_choice_t
    implicit none
@@ -30,19 +28,16 @@ contains
 
    !> Execute the verb of the command line. Collective.
    subroutine execute(command, comm, error)
-      type(command_t), intent(in) :: command
+      type(run_command_t), intent(in) :: command
       class(communicator_t), intent(inout) :: comm
       !> Allocated if the verb fails
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
-      type(bench_settings_t) :: bench
       type(thread_choice_t) :: threads
       character(len=:), allocatable :: crowd, text
 
       if (command%help .or. command%version) then
-         if (comm%is_root() .and. command%help) call print_line(usage(command%verb, command%program), error)
-         if (comm%is_root() .and. .not. command%help) call print_line('polydem '//program_version//' (git '// &
-                                                                      git_revision//')', error)
+         call answer_question(command, comm, error)
          return
       end if
       call set_threads(command, threads, error)
@@ -69,14 +64,6 @@ contains
          else
             call check_simulation(settings, error, crowd, threads)
          end if
-      case ('replay')
-         call warn(oversubscription_text(int(max(1, command%threads), ip), int(omp_get_num_procs(), ip)))
-         call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
-                           int(command%steps, ip), command%samples, command%oracle)
-      case ('bench')
-         call read_settings(command%file, command%overrides, bench, error)
-         if (.not. allocated(error)) call check_threads(maxval(bench%threads), error)
-         if (.not. allocated(error)) call run_bench(bench, error)
       case default
          if (command%file == '') call describe_program(error)
          if (command%checks) then
@@ -88,9 +75,9 @@ contains
    end subroutine execute
 
    !> Set the number of OpenMP threads, and check it against system limits: from the command line, otherwise from
-   !> OMP_NUM_THREADS. Without both, `run` and `check` choose it once they know the scene, and `bench` sets its own.
+   !> OMP_NUM_THREADS. Without both, `run` and `check` choose it once they know the scene.
    subroutine set_threads(command, choice, error)
-      type(command_t), intent(in) :: command
+      type(run_command_t), intent(in) :: command
       type(thread_choice_t), intent(out) :: choice
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: value
@@ -100,9 +87,9 @@ contains
          choice%reason = 'given by --threads'
          call check_threads(int(command%threads, ip), error)
          if (.not. allocated(error)) call omp_set_num_threads(command%threads)
-      else if (command%verb /= 'replay') then
+      else
          value = environment('OMP_NUM_THREADS')
-         choice%is_open = command%verb /= 'bench' .and. .not. is_given(value)
+         choice%is_open = .not. is_given(value)
          if (choice%is_open) then
             call omp_set_num_threads(1)
          else

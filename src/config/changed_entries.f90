@@ -1,7 +1,7 @@
 !> Comparison of the settings of two runs: a text that lists the entries that differ.
 module polydem_changed_entries
    use polydem_kinds, only: wp
-   use polydem_namelist_entries, only: is_repeatable
+   use polydem_namelist_entries, only: entries, is_repeatable
    use polydem_strings, only: text_t
    implicit none
    private
@@ -126,7 +126,7 @@ contains
          else if (equals > 0) then
             name = group//'.'//line(:equals - 1)
             if (any(harmless == name)) cycle
-            if (is_repeatable(group)) then
+            if (is_repeatable(entries, group)) then
                ! The first entry of a repeatable group is its name.
                group = group//'.'//line(equals + 4:len(line) - 1)
                place = place_of(name, names)

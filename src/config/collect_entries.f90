@@ -1,9 +1,9 @@
 !> Collects what is given of each namelist group: the statements of the file, and the overrides of the command line.
 module polydem_collect_entries
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_group_instances, only: index_of_instance, instance_t, names_of, new_instances
+   use polydem_group_instances, only: first_row_of, index_of_instance, instance_t, names_of, new_instances
    use polydem_missing_entries, only: missing_text
-   use polydem_namelist_entries, only: bench_group, entries, first_row, group_length, groups, is_repeatable, keys_of
+   use polydem_namelist_entries, only: entries, entry_t, group_length, groups, is_repeatable, keys_of, row_in
    use polydem_namelist_statements, only: read_statements, statement_t
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: is_text, read_value, value_t
@@ -20,44 +20,45 @@ module polydem_collect_entries
 contains
 
    !> Make the instances of all groups with the statements of the file and, in their place, the overrides.
-   pure subroutine collect_entries(source, statements, overrides, of_bench, instances, error)
+   pure subroutine collect_entries(source, table, statements, overrides, instances, error)
       !> Namelist text
       type(source_t), intent(in) :: source
+      !> Table of entries
+      type(entry_t), intent(in) :: table(:)
       !> Statements of the text
       type(statement_t), intent(in) :: statements(:)
       !> Overrides; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
-      !> Whether the text describes a bench
-      logical, intent(in) :: of_bench
       !> Instances with their names, without values
       type(instance_t), allocatable, intent(out) :: instances(:)
       !> First group or entry that is unknown, is given twice or has no valid name
       type(error_t), allocatable, intent(inout) :: error
       integer :: current, k, opened(size(statements))
 
-      call new_instances(source%name, statements, instances, opened, error)
+      call new_instances(source%name, table, statements, instances, opened, error)
       if (allocated(error)) return
       do k = 1, size(statements)
-         call check_names(statements(k), of_bench, error)
+         call check_names(statements(k), table, error)
          if (allocated(error)) return
          if (statements(k)%key == '') then
             current = opened(k)
-            call open_instance(statements(k), instances(current), error)
+            call open_instance(statements(k), is_repeatable(table, statements(k)%group), instances(current), error)
          else
             call store_statement(statements(k), instances(current), error)
          end if
          if (allocated(error)) return
       end do
-      call name_instances(instances, error)
+      call name_instances(table, instances, error)
       do k = 1, size(overrides)
          if (allocated(error)) return
-         call apply_override(trim(overrides(k)), of_bench, instances, error)
+         call apply_override(trim(overrides(k)), table, instances, error)
       end do
    end subroutine collect_entries
 
    !> Open an instance; a single group can be opened once.
-   pure subroutine open_instance(opening, instance, error)
+   pure subroutine open_instance(opening, is_one_of_several, instance, error)
       type(statement_t), intent(in) :: opening
+      logical, intent(in) :: is_one_of_several
       type(instance_t), intent(inout) :: instance
       type(error_t), allocatable, intent(inout) :: error
 
@@ -67,7 +68,7 @@ contains
       end if
       instance%line = opening%line
       instance%is_given = .true.
-      if (is_repeatable(opening%group)) instance%place = opening%place
+      if (is_one_of_several) instance%place = opening%place
    end subroutine open_instance
 
    !> Store a statement of the file under the first row of its entry.
@@ -76,7 +77,7 @@ contains
       type(instance_t), intent(inout) :: instance
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (given => instance%given(first_row(statement%group, statement%key)))
+      associate (given => instance%given(first_row_of(instance, statement%key)))
          if (allocated(given%values)) then
             call raise_twice(statement, given%line, error)
          else
@@ -99,20 +100,21 @@ contains
    end subroutine raise_twice
 
    !> Set the names of the instances of repeatable groups, which the file must give and which must differ in a group.
-   pure subroutine name_instances(instances, error)
+   pure subroutine name_instances(table, instances, error)
+      type(entry_t), intent(in) :: table(:)
       type(instance_t), intent(inout) :: instances(:)
       type(error_t), allocatable, intent(inout) :: error
       type(value_t) :: value
       integer :: k, row, same
 
       do k = 1, size(instances)
-         if (.not. is_repeatable(instances(k)%group)) cycle
-         row = first_row(instances(k)%group, 'name')
+         if (.not. is_repeatable(table, instances(k)%group)) cycle
+         row = first_row_of(instances(k), 'name')
          associate (instance => instances(k), given => instances(k)%given(row))
             if (allocated(given%values)) then
-               call read_value(entries(row), given, value, error)
+               call read_value(table(row), given, value, error)
             else
-               call raise(error, input_error, instance%place//': '//missing_text(entries(row), instance))
+               call raise(error, input_error, instance%place//': '//missing_text(table(row), instance))
             end if
             if (len(value%text) > longest_name .and. .not. allocated(error)) call raise(error, input_error, &
                given%place//': ''name'' in &'//trim(instance%group)//' is a name of '//to_text(len(value%text))// &
@@ -130,39 +132,52 @@ contains
       end do
    end subroutine name_instances
 
-   !> Check that the table contains the group and the key, and that the group fits a bench or a run.
-   pure subroutine check_names(statement, of_bench, error)
+   !> Check that the table contains the group and the key.
+   pure subroutine check_names(statement, table, error)
       type(statement_t), intent(in) :: statement
-      logical, intent(in) :: of_bench
+      type(entry_t), intent(in) :: table(:)
       type(error_t), allocatable, intent(inout) :: error
 
-      if (all(groups() /= statement%group)) then
-         call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
-            suggestion(statement%group, pack(groups(), (groups() == bench_group) .eqv. of_bench)))
-      else if (of_bench .and. statement%group /= bench_group) then
-         call raise(error, input_error, statement%place//': group &'//statement%group//' belongs to a run; a bench '// &
-            'has only the group &bench')
-      else if (statement%group == bench_group .and. .not. of_bench) then
-         call raise(error, input_error, statement%place// &
-            ': group &bench belongs to a bench; use polydem bench FILE.nml')
-      else if (statement%key /= '' .and. first_row(statement%group, statement%key) == 0) then
-         call raise_unknown_key(statement, error)
+      if (all(table%group /= statement%group)) then
+         call raise_unknown_group(statement, table, error)
+      else if (statement%key /= '' .and. row_in(table, statement%group, statement%key) == 0) then
+         call raise_unknown_key(statement, table, error)
       end if
    end subroutine check_names
 
-   !> Raise an error about a key that the group does not have. The message names the groups that have it.
-   pure subroutine raise_unknown_key(statement, error)
+   !> Raise an error about a group that the table does not have. That of a bench and those of runs are known.
+   pure subroutine raise_unknown_group(statement, table, error)
       type(statement_t), intent(in) :: statement
+      type(entry_t), intent(in) :: table(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: own
+
+      if (statement%group == 'bench') then
+         call raise(error, input_error, statement%place// &
+            ': group &bench belongs to a bench; use ./polydem bench FILE.nml, or polydem_lab bench FILE.nml')
+      else if (any(entries%group == statement%group)) then
+         own = trim(table(1)%group)
+         call raise(error, input_error, statement%place//': group &'//statement%group//' belongs to a run; a '//own// &
+            ' has only the group &'//own)
+      else
+         call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
+            suggestion(statement%group, groups(table)))
+      end if
+   end subroutine raise_unknown_group
+
+   !> Raise an error about a key that the group does not have. The message names the groups that have it.
+   pure subroutine raise_unknown_key(statement, table, error)
+      type(statement_t), intent(in) :: statement
+      type(entry_t), intent(in) :: table(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=group_length), allocatable :: names(:)
       character(len=:), allocatable :: owners
       integer :: k
 
-      names = groups()
+      names = groups(table)
       owners = ''
       do k = 1, size(names)
-         if ((names(k) == bench_group) .neqv. (statement%group == bench_group)) cycle
-         if (first_row(names(k), statement%key) == 0) cycle
+         if (row_in(table, names(k), statement%key) == 0) cycle
          if (owners /= '') owners = owners//' and '
          owners = owners//'&'//trim(names(k))
       end do
@@ -174,7 +189,7 @@ contains
             ', not of &'//statement%group)
       else
          call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
-            statement%group//suggestion(statement%key, keys_of(statement%group)))
+            statement%group//suggestion(statement%key, keys_of(table, statement%group)))
       end if
    end subroutine raise_unknown_key
 
@@ -207,19 +222,19 @@ contains
    end function new_name
 
    !> Put an override in the place of a statement of the file.
-   pure subroutine apply_override(override, of_bench, instances, error)
+   pure subroutine apply_override(override, table, instances, error)
       !> 'group.key=value', or 'group.name.key=value' of a repeatable group. Words, paths and names need no quotes
       character(len=*), intent(in) :: override
-      logical, intent(in) :: of_bench
+      type(entry_t), intent(in) :: table(:)
       type(instance_t), intent(inout) :: instances(:)
       type(error_t), allocatable, intent(inout) :: error
       type(statement_t) :: statement
       character(len=:), allocatable :: name
       integer :: place
 
-      call read_override(override, of_bench, statement, name, error)
+      call read_override(override, table, statement, name, error)
       if (allocated(error)) return
-      if (is_repeatable(statement%group)) then
+      if (is_repeatable(table, statement%group)) then
          place = index_of_instance(instances, statement%group, name)
          if (place == 0) call raise_unknown_instance(statement, name, names_of(instances, statement%group), error)
          if (place > 0 .and. statement%key == 'name') call raise(error, input_error, statement%place// &
@@ -228,14 +243,14 @@ contains
       else
          place = index_of_instance(instances, statement%group)
       end if
-      instances(place)%given(first_row(statement%group, statement%key)) = statement
+      instances(place)%given(first_row_of(instances(place), statement%key)) = statement
       instances(place)%is_given = .true.
    end subroutine apply_override
 
    !> Read 'group.key=value' as the statement '&group key = value', and the name in 'group.name.key=value'.
-   pure subroutine read_override(override, of_bench, statement, name, error)
+   pure subroutine read_override(override, table, statement, name, error)
       character(len=*), intent(in) :: override
-      logical, intent(in) :: of_bench
+      type(entry_t), intent(in) :: table(:)
       type(statement_t), intent(out) :: statement
       !> Name of the instance of a repeatable group; empty if it is not given
       character(len=:), allocatable, intent(out) :: name
@@ -252,7 +267,8 @@ contains
       equals = index(override, '=')
       dot = index(override(:max(0, equals - 1)), '.')
       last = dot
-      if (is_repeatable(lower_case(override(:max(0, dot - 1))))) last = index(override(:equals - 1), '.', back=.true.)
+      if (is_repeatable(table, lower_case(override(:max(0, dot - 1))))) &
+         last = index(override(:equals - 1), '.', back=.true.)
       if (dot < 2 .or. equals < last + 2) then
          call raise(error, input_error, source%name//': group.key=value is expected')
          return
@@ -260,7 +276,7 @@ contains
       name = override(dot + 1:last - 1)
       associate (group => override(:dot - 1), key => override(last + 1:equals - 1), &
                  value => override(equals + 1:))
-         source%text = '&'//group//line_end//key//'='//value_of_override(group, key, value)//line_end//'/'
+         source%text = '&'//group//line_end//key//'='//value_of_override(table, group, key, value)//line_end//'/'
       end associate
       call read_statements(source, statements, error)
       if (allocated(error)) return
@@ -270,19 +286,20 @@ contains
       end if
       statement = statements(2)
       statement%is_override = .true.
-      call check_names(statement, of_bench, error)
+      call check_names(statement, table, error)
    end subroutine read_override
 
    !> Value of an override; quotes are added if the entry is a text without quotes
-   pure function value_of_override(group, key, given) result(text)
+   pure function value_of_override(table, group, key, given) result(text)
+      type(entry_t), intent(in) :: table(:)
       character(len=*), intent(in) :: group, key, given
       character(len=:), allocatable :: text
       integer :: row
 
       text = given
-      row = first_row(group, key)
+      row = row_in(table, group, key)
       if (row == 0) return
-      if (.not. is_text(entries(row))) return
+      if (.not. is_text(table(row))) return
       if (scan(adjustl(given)//' ', '''"') == 1) return
       text = quoted(trim(adjustl(given)))
    end function value_of_override

@@ -3,13 +3,14 @@
 module polydem_group_instances
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp
-   use polydem_namelist_entries, only: entries, first_row, group_length, groups, is_repeatable
+   use polydem_namelist_entries, only: entry_t, group_length, groups, is_repeatable, key_length
    use polydem_namelist_statements, only: statement_t
    use polydem_namelist_values, only: value_t
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: instance_t, new_instances, new_instance, store_value, row_of, index_of_instance, names_of, full_name
+   public :: instance_t, new_instances, new_instance, store_value, row_of, first_row_of, index_of_instance, &
+      names_of, full_name
 
    !> Greatest number of instances of a group. Names and parts are compared in pairs
    integer, parameter :: most_instances = 2000
@@ -30,6 +31,8 @@ module polydem_group_instances
       integer :: line = 0
       !> Whether the file or an override contains the group
       logical :: is_given = .false.
+      !> Key of each entry, (row of the table)
+      character(len=key_length), allocatable :: keys(:)
       !> Statement of each entry, under its first row; unallocated values if it is not given, (row of the table)
       type(statement_t), allocatable :: given(:)
       !> Values, (row of the table)
@@ -39,9 +42,11 @@ module polydem_group_instances
 contains
 
    !> Make the instances of all groups, in the order of the table of entries, without their names and entries.
-   pure subroutine new_instances(file, statements, instances, opened, error)
+   pure subroutine new_instances(file, table, statements, instances, opened, error)
       !> Name of the source in messages
       character(len=*), intent(in) :: file
+      !> Table of entries
+      type(entry_t), intent(in) :: table(:)
       !> Statements of the file
       type(statement_t), intent(in) :: statements(:)
       !> Instances
@@ -51,22 +56,22 @@ contains
       !> A group has too many instances
       type(error_t), allocatable, intent(inout) :: error
       character(len=group_length), allocatable :: names(:)
-      integer :: counts(size(groups())), g, k, most, n
+      integer :: counts(size(groups(table))), g, k, most, n
 
-      names = groups()
+      names = groups(table)
       opened = 0
       n = 0
       do g = 1, size(names)
          counts(g) = 0
          do k = 1, size(statements)
             if (statements(k)%key /= '' .or. statements(k)%group /= names(g)) cycle
-            if (is_repeatable(names(g)) .or. counts(g) == 0) counts(g) = counts(g) + 1
+            if (is_repeatable(table, names(g)) .or. counts(g) == 0) counts(g) = counts(g) + 1
             opened(k) = n + counts(g)
          end do
          most = merge(most_materials, most_instances, names(g) == 'material')
          if (counts(g) > most) call raise(error, input_error, file//': there are '//to_text(counts(g))// &
             ' groups &'//trim(names(g))//', but at most '//to_text(most)//' are possible')
-         if (.not. is_repeatable(names(g))) counts(g) = 1
+         if (.not. is_repeatable(table, names(g))) counts(g) = 1
          n = n + counts(g)
       end do
       if (allocated(error)) return
@@ -75,7 +80,7 @@ contains
       do g = 1, size(names)
          do k = 1, counts(g)
             n = n + 1
-            call new_instance(names(g), instances(n))
+            call new_instance(table, names(g), instances(n))
             instances(n)%number = k
             instances(n)%place = file
          end do
@@ -83,7 +88,9 @@ contains
    end subroutine new_instances
 
    !> Make an instance of a group without a name and without values.
-   pure subroutine new_instance(group, instance)
+   pure subroutine new_instance(table, group, instance)
+      !> Table of entries
+      type(entry_t), intent(in) :: table(:)
       !> Namelist group
       character(len=*), intent(in) :: group
       type(instance_t), intent(out) :: instance
@@ -92,9 +99,12 @@ contains
       instance%group = group
       instance%name = ''
       instance%place = ''
-      first = first_entry(group)
-      associate (last => first + count(entries%group == group) - 1)
-         allocate (instance%given(first:last), instance%values(first:last))
+      do first = 1, size(table)
+         if (table(first)%group == group) exit
+      end do
+      associate (last => first + count(table%group == group) - 1)
+         allocate (instance%given(first:last), instance%values(first:last), instance%keys(first:last))
+         instance%keys(:) = table(first:last)%key
       end associate
    end subroutine new_instance
 
@@ -114,7 +124,7 @@ contains
       integer :: row
 
       do row = lbound(instance%values, 1), ubound(instance%values, 1)
-         if (entries(row)%key /= key) cycle
+         if (instance%keys(row) /= key) cycle
          associate (value => instance%values(row))
             if (present(reals)) value%reals = reals
             if (present(integers)) value%integers = integers
@@ -128,15 +138,6 @@ contains
       end do
    end subroutine store_value
 
-   !> First row of a group
-   pure integer function first_entry(group)
-      character(len=*), intent(in) :: group
-
-      do first_entry = 1, size(entries)
-         if (entries(first_entry)%group == group) return
-      end do
-   end function first_entry
-
    !> Row of an entry that is in use; the first row of the entry if none is in use
    pure integer function row_of(instance, key) result(row)
       !> Instance of a group
@@ -145,10 +146,23 @@ contains
       character(len=*), intent(in) :: key
 
       do row = lbound(instance%values, 1), ubound(instance%values, 1)
-         if (instance%values(row)%is_active .and. entries(row)%key == key) return
+         if (instance%values(row)%is_active .and. instance%keys(row) == key) return
       end do
-      row = first_row(instance%group, key)
+      row = first_row_of(instance, key)
    end function row_of
+
+   !> First row of an entry; 0 if the group does not have it
+   pure integer function first_row_of(instance, key) result(row)
+      !> Instance of a group
+      type(instance_t), intent(in) :: instance
+      !> Name in the group
+      character(len=*), intent(in) :: key
+
+      do row = lbound(instance%keys, 1), ubound(instance%keys, 1)
+         if (instance%keys(row) == key) return
+      end do
+      row = 0
+   end function first_row_of
 
    !> Index of an instance; 0 if there is none
    pure integer function index_of_instance(instances, group, name) result(place)

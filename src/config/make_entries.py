@@ -3,6 +3,8 @@
 make_entries.py ENTRIES.txt FOLDER: the Fortran sources entry_table.f90 (the table as constants), settings.f90 (one type
 per group), fill_groups.f90 (fills these types) and pair_entries.f90 (numbers that pairs of materials may have).
 make_entries.py ENTRIES.txt FOLDER --pairs: pair_values.f90, the type of these numbers in a force law.
+make_entries.py ENTRIES.txt FOLDER --alone: of a table with one group NAME, which is no group of a run, NAME_table.f90,
+NAME_settings.f90 and fill_NAME.f90.
 make_entries.py ENTRIES.txt PAGE.md [--check]: the table of the manual, between the lines <!-- entries --> and
 <!-- /entries -->; with --check it must be there already.
 """
@@ -14,14 +16,14 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 from generator.manual import update_manual  # noqa: E402
 from generator.pairs import pair_module, value_module  # noqa: E402
-from generator.settings import fill_module, settings_module, table_module  # noqa: E402
+from generator.settings import fill_module, lone_modules, settings_module, table_module  # noqa: E402
 from generator.table import TableError, read_table  # noqa: E402
 
 
 def main(table, target, *options):
     """Write the sources or the manual."""
     try:
-        groups, rows = read_table(Path(table).read_text(encoding="utf-8"))
+        groups, rows = read_table(Path(table).read_text(encoding="utf-8"), Path(table).parent)
     except TableError as error:
         sys.exit(f"{table}: {error}")
     if target.endswith(".md"):
@@ -29,6 +31,8 @@ def main(table, target, *options):
         return
     if "--pairs" in options:
         made = {"pair_values": value_module(rows)}
+    elif "--alone" in options:
+        made = lone_modules(groups, rows)
     else:
         made = {"entry_table": table_module(groups, rows), "settings": settings_module(groups, rows),
                 "fill_groups": fill_module(groups, rows), "pair_entries": pair_module(rows)}

@@ -2,7 +2,7 @@
 module polydem_namelist_entry
    implicit none
    private
-   public :: entry_t, required, group_length, key_length, allowed_length, bench_group
+   public :: entry_t, required, group_length, key_length, allowed_length
 
    !> Lengths of the character components of a row
    integer, parameter :: group_length = 13, key_length = 24, allowed_length = 300
@@ -37,8 +37,5 @@ module polydem_namelist_entry
 
    !> Default of an entry that must be given if it is in use
    character(len=*), parameter :: required = '(required)'
-
-   !> Group of a bench. A bench uses only this group, and a run does not use it
-   character(len=*), parameter :: bench_group = 'bench'
 
 end module polydem_namelist_entry

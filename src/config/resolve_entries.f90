@@ -7,10 +7,10 @@
 module polydem_resolve_entries
    use polydem_collect_entries, only: collect_entries
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_group_instances, only: instance_t, names_of, row_of
+   use polydem_group_instances, only: first_row_of, instance_t, names_of, row_of
    use polydem_kinds, only: ip, wp
-   use polydem_missing_entries, only: example_of, missing_text
-   use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, required
+   use polydem_missing_entries, only: missing_group, missing_text
+   use polydem_namelist_entries, only: entries, entry_t, required
    use polydem_namelist_statements, only: read_statements, statement_t
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: is_text, label, read_value, value_t, value_text
@@ -22,11 +22,13 @@ module polydem_resolve_entries
 contains
 
    !> Find the values of all instances of groups.
-   pure subroutine resolve_entries(source, of_bench, overrides, instances, error)
+   pure subroutine resolve_entries(source, table, example, overrides, instances, error)
       !> Namelist text
       type(source_t), intent(in) :: source
-      !> Whether the text describes a bench (group &bench) or a run (all other groups)
-      logical, intent(in) :: of_bench
+      !> Table of entries
+      type(entry_t), intent(in) :: table(:)
+      !> A short text with the groups that must be there, for messages
+      character(len=*), intent(in) :: example
       !> Overrides 'group.key=value' or 'group.name.key=value'; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
       !> Instances with values, in the order of the table; those of a repeatable group in the order of the file
@@ -34,49 +36,47 @@ contains
       !> First error found
       type(error_t), allocatable, intent(inout) :: error
       type(statement_t), allocatable :: statements(:)
-      character(len=:), allocatable :: text
       integer :: k, row
 
       call read_statements(source, statements, error)
       if (allocated(error)) return
       if (size(statements) == 0) then
-         text = example_of('scene')//' '//example_of('integrate')
-         if (of_bench) text = example_of(bench_group)
-         call raise(error, input_error, source%name//': the file contains no namelist group; for example: '//text)
+         call raise(error, input_error, source%name//': the file contains no namelist group; for example: '//example)
          return
       end if
-      call collect_entries(source, statements, overrides, of_bench, instances, error)
+      call collect_entries(source, table, statements, overrides, instances, error)
       if (allocated(error)) return
       do k = 1, size(instances)
          do row = lbound(instances(k)%values, 1), ubound(instances(k)%values, 1)
-            call resolve_row(of_bench, row, any(instances%group == 'stage'), instances(k), error)
+            call resolve_row(table(row), row, example, any(instances%group == 'stage'), instances(k), error)
             if (allocated(error)) return
          end do
       end do
       do k = 1, size(instances)
          do row = lbound(instances(k)%values, 1), ubound(instances(k)%values, 1)
-            call check_use(row, instances(k), error)
-            if (.not. allocated(error) .and. entries(row)%type == 'name' .and. entries(row)%allowed /= '') &
-               call check_reference(entries(row), instances(k)%values(row), instances, error)
+            call check_use(table, row, instances(k), error)
+            if (.not. allocated(error) .and. table(row)%type == 'name' .and. table(row)%allowed /= '') &
+               call check_reference(table(row), instances(k)%values(row), instances, error)
             if (allocated(error)) return
          end do
       end do
    end subroutine resolve_entries
 
    !> Find the value of a row: the given value, or the default.
-   pure subroutine resolve_row(of_bench, row, has_stages, instance, error)
-      logical, intent(in) :: of_bench
+   pure subroutine resolve_row(entry, row, example, has_stages, instance, error)
+      type(entry_t), intent(in) :: entry
       integer, intent(in) :: row
+      !> A short text with the groups that must be there
+      character(len=*), intent(in) :: example
       !> Whether there are groups &stage, which have durations of their own
       logical, intent(in) :: has_stages
       type(instance_t), intent(inout) :: instance
       type(error_t), allocatable, intent(inout) :: error
       integer :: home
 
-      associate (entry => entries(row), value => instance%values(row))
-         home = first_row(entry%group, entry%key)
-         value%is_active = (entry%group == bench_group) .eqv. of_bench
-         if (value%is_active) value%is_active = is_needed(entry, instance)
+      home = first_row_of(instance, trim(entry%key))
+      associate (value => instance%values(row))
+         value%is_active = is_needed(entry, instance)
          if (value%is_active .and. has_stages .and. entry%group == 'integrate' .and. entry%key == 'duration') then
             value%is_active = .false.
             if (allocated(instance%given(home)%values)) then
@@ -91,6 +91,8 @@ contains
             call set_unused(instance%place, 0, entry, value)
          else if (entry%default /= required) then
             call read_value(entry, default_statement(instance%place, entry), value, error)
+         else if (.not. instance%is_given .and. value%is_active) then
+            call raise(error, input_error, instance%place//': '//missing_group(entry%group, example))
          else if (value%is_active) then
             call raise(error, input_error, instance%place//': '//missing_text(entry, instance))
          else
@@ -161,7 +163,8 @@ contains
    end subroutine set_unused
 
    !> Check that the entry of a row is in use if it is given. An entry of the file may be unused because of an override.
-   pure subroutine check_use(home, instance, error)
+   pure subroutine check_use(table, home, instance, error)
+      type(entry_t), intent(in) :: table(:)
       !> First row of an entry; nothing is given under other rows
       integer, intent(in) :: home
       type(instance_t), intent(in) :: instance
@@ -173,14 +176,14 @@ contains
          if (.not. allocated(given%values)) return
          needs = ''
          do row = home, ubound(instance%values, 1)
-            if (entries(row)%key /= given%key) cycle
+            if (table(row)%key /= given%key) cycle
             if (instance%values(row)%is_active) return
-            needs = needs//entries(row)%needs(index(entries(row)%needs, ':') + 1:)
+            needs = needs//table(row)%needs(index(table(row)%needs, ':') + 1:)
          end do
-         key = entries(home)%needs(:index(entries(home)%needs, ':') - 1)
+         key = table(home)%needs(:index(table(home)%needs, ':') - 1)
          associate (decider => instance%values(row_of(instance, key)))
             if (decider%is_override .and. .not. given%is_override) return
-            call raise(error, input_error, given%place//': '//label(entries(home))//' is used only with '//key// &
+            call raise(error, input_error, given%place//': '//label(table(home))//' is used only with '//key// &
                ' = '//join(split_words(needs), ' or ')//', not with '//decider%text// &
                remedy(instance%group, key, given%key))
          end associate
@@ -229,7 +232,9 @@ contains
    end subroutine check_reference
 
    !> All entries in use as namelist text that can be read again, one entry per line, without empty lists and groups
-   pure function resolved_text(instances, given_only) result(text)
+   pure function resolved_text(table, instances, given_only) result(text)
+      !> Table of entries
+      type(entry_t), intent(in) :: table(:)
       !> Instances with values
       type(instance_t), intent(in) :: instances(:)
       !> Whether entries that are not given are left out; default: no
@@ -242,11 +247,11 @@ contains
       do k = 1, size(instances)
          chosen = instances(k)%values%is_active
          if (present(given_only)) chosen = chosen .and. (instances(k)%values%is_given .or. .not. given_only)
-         if (any(chosen)) text = text//chosen_text(instances(k), chosen)
+         if (any(chosen)) text = text//chosen_text(table, instances(k), chosen)
       end do
    end function resolved_text
 
-   !> Write the entries of a group that are in use and differ from their defaults as namelist text.
+   !> Write the entries of a group of a run that are in use and differ from their defaults as namelist text.
    pure subroutine write_group(instance, text)
       !> Group with values; which of them are in use is set
       type(instance_t), intent(inout) :: instance
@@ -269,11 +274,12 @@ contains
             end if
          end associate
       end do
-      text = chosen_text(instance, chosen)
+      text = chosen_text(entries, instance, chosen)
    end subroutine write_group
 
    !> Some entries of a group as namelist text, without empty lists
-   pure function chosen_text(instance, chosen) result(text)
+   pure function chosen_text(table, instance, chosen) result(text)
+      type(entry_t), intent(in) :: table(:)
       type(instance_t), intent(in) :: instance
       !> Whether an entry is among them, (row of the group)
       logical, intent(in) :: chosen(:)
@@ -284,8 +290,8 @@ contains
       text = '&'//trim(instance%group)//line_end
       do row = lbound(instance%values, 1), ubound(instance%values, 1)
          if (.not. chosen(row - lbound(instance%values, 1) + 1)) cycle
-         value = value_text(entries(row), instance%values(row))
-         if (value /= '') text = text//'   '//trim(entries(row)%key)//' = '//value//line_end
+         value = value_text(table(row), instance%values(row))
+         if (value /= '') text = text//'   '//trim(table(row)%key)//' = '//value//line_end
       end do
       text = text//'/'//line_end
    end function chosen_text

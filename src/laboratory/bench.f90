@@ -8,6 +8,7 @@ module polydem_bench
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_set_num_threads
    use polydem_bench_cases, only: bench_t, measure_scene, write_end
    use polydem_bench_scene, only: provide_result, read_scene, scene_t
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_bench_summary, only: write_summary
    use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t
@@ -20,7 +21,6 @@ module polydem_bench
    use polydem_oversubscription, only: oversubscription_text
    use polydem_provenance, only: threads_are_bound
    use polydem_result_files, only: default_folder
-   use polydem_settings, only: bench_settings_t
    use polydem_strings, only: decimal
    implicit none
    private

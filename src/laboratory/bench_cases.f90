@@ -2,6 +2,7 @@
 module polydem_bench_cases
    use omp_lib, only: omp_set_num_threads
    use polydem_bench_scene, only: scene_t
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_bench_subject, only: complete_case, find_reference, load_subject, subject_t, take_sample
    use polydem_check_sample, only: check_sample
    use polydem_clock, only: wall_seconds
@@ -14,7 +15,6 @@ module polydem_bench_cases
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_reference_file, only: read_reference, write_reference
    use polydem_sample_file, only: case_t, sample_path, sample_t, write_sample
-   use polydem_settings, only: bench_settings_t
    use polydem_strings, only: decimal, to_text
    use polydem_waiting_cost, only: measure_waiting
    implicit none

@@ -1,11 +1,11 @@
 !> The results of a bench as a table on the screen, from its samples on disk.
 module polydem_bench_summary
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip
    use polydem_log, only: log_t
    use polydem_sample_file, only: case_t, sample_path
-   use polydem_settings, only: bench_settings_t
    use polydem_step_clock, only: median
    implicit none
    private

@@ -1,10 +1,10 @@
-"""Tab completion and man page, made from the help texts of the verbs.
+"""Tab completion and man page of a program, made from the help texts of its verbs.
 
-usage: shell_texts.py bash|zsh|fish|man VERSION ENTRIES.md HELP.txt...
+usage: shell_texts.py PROGRAM bash|zsh|fish|man VERSION ENTRIES.md... HELP.txt...
 
 A help text has the call of its verb in its first line, the meaning in its second one, and its options below. What a
 help text names is completed, so completion and man page never differ from the help: verbs, options, and the values of
-an option that are listed below it. Entries of the namelist come from the table of the manual.
+an option that are listed below it. Entries of the namelist come from the tables of the manual.
 """
 
 import os
@@ -21,6 +21,16 @@ VALUES = re.compile(r" {28}(\w+(?:, \w+)*)(?:  |$)")
 ENTRY, NAME = "GROUP.KEY=VALUE", "NAME"
 #: Words of a call that are chosen, as in sweep make|run|collect
 CHOICE = re.compile(r"^[\w-]+(?:\|[\w-]+)+$")
+
+#: What a program is, and what it does
+PURPOSES = {
+    "polydem": ("discrete elements for convex polygons in two dimensions",
+                "polydem simulates granular matter made of convex polygons.",
+                "A namelist describes a simulation; results are folders of HDF5 files."),
+    "polydem_lab": ("compares algorithms of neighbour search",
+                    "polydem_lab finds the pairs of boxes that runs of polydem recorded, and times each algorithm.",
+                    "A namelist describes a bench."),
+}
 
 EXIT_CODES = (("0", "done"), ("1", "the run failed, for example because a guard stopped it"),
               ("2", "bad input: namelist, bodies file, trace or command line"),
@@ -72,10 +82,10 @@ def read_verb(path):
     return Verb(words[0], call, meaning, tuple(lines), tuple(options.values()), choices, values)
 
 
-def read_entries(path):
+def read_entries(paths):
     """Entries as `--set` takes them, from the manual; the name of a group that may be there several times is NAME."""
     several, found = set(), {}
-    page = Path(path).read_text(encoding="utf-8")
+    page = "".join(Path(path).read_text(encoding="utf-8") for path in paths)
     for group, key, kind in re.findall(r"^\| &(\w+) \| `(\w+)` \| (\w+) ", page, re.MULTILINE):
         if (key, kind) == ("name", "name"):
             several.add(group)
@@ -94,7 +104,7 @@ def plain(entries):
     return [entry for entry in entries if f".{NAME}." not in entry]
 
 
-def bash_text(verbs, entries):
+def bash_text(verbs, entries, program):
     """Completion for bash."""
     cases, known = [], values_of(verbs, entries)
     kinds = {name: value for verb in verbs for name, value, _ in verb.options if value in known}
@@ -106,7 +116,7 @@ def bash_text(verbs, entries):
                      f"      valued='{' '.join(values)}'\n      choices='{' '.join(verb.choices)}'\n      ;;")
     names = " ".join([*(verb.name for verb in verbs), "help", "--help", "--version"])
     return "\n".join([
-        "# Tab completion of polydem for bash", "_polydem() {",
+        f"# Tab completion of {program} for bash", f"_{program}() {{",
         "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} options='' valued='' choices=''",
         "  local values='' name",
         "  COMPREPLY=()", "  if [ \"$COMP_CWORD\" -eq 1 ]; then",
@@ -123,27 +133,28 @@ def bash_text(verbs, entries):
         "    mapfile -t COMPREPLY < <(compgen -W \"$options\" -- \"$word\")",
         "  elif [ \"$COMP_CWORD\" -eq 2 ] && [ -n \"$choices\" ]; then",
         "    mapfile -t COMPREPLY < <(compgen -W \"$choices\" -- \"$word\")", "  fi", "}",
-        "# Where nothing is suggested, files are.", "complete -o default -F _polydem polydem", ""])
+        "# Where nothing is suggested, files are.", f"complete -o default -F _{program} {program}", ""])
 
 
-def zsh_text(verbs, entries):
+def zsh_text(verbs, entries, program):
     """Completion for zsh."""
     known = values_of(verbs, entries)
 
     def action(value):
         """How a value is completed."""
         if value == ENTRY:
-            return "_polydem_entries"
+            return f"_{program}_entries"
         return f"({' '.join(known[value])})" if value in known else "_files"
 
     def quoted(text):
         return re.sub(r"([\[\]:\\])", r"\\\1", text).replace("'", "'\\''")
 
-    lines = ["#compdef polydem", "# Tab completion of polydem for zsh", "_polydem_entries() {",
+    lines = [f"#compdef {program}", f"# Tab completion of {program} for zsh", f"_{program}_entries() {{",
              "  # An entry of a group that may be there several times follows the name that is typed.",
              f"  local -a entries=({' '.join(entries)})", "  local name=${PREFIX#*.}",
              "  [[ $PREFIX != *.*.* ]] || entries=(${entries/.NAME./.${name%%.*}.})",
-             "  compadd -S '' -- ${entries:#*.NAME.*}", "}", "_polydem() {", "  local -a verbs", "  verbs=("]
+             "  compadd -S '' -- ${entries:#*.NAME.*}", "}", f"_{program}() {{", "  local -a verbs",
+             "  verbs=("]
     lines += [f"    '{verb.name}:{quoted(verb.meaning)}'" for verb in verbs]
     lines += ["    'help:print the options of a verb'", "  )", "  if (( CURRENT == 2 )); then",
               "    _describe 'verb' verbs", "    return", "  fi", "  local verb=$words[2]", "  shift words",
@@ -154,11 +165,11 @@ def zsh_text(verbs, entries):
         first = f"'1:step:({' '.join(verb.choices)})' " if verb.choices else ""
         lines.append(f"    {verb.name}) _arguments {' '.join(specs)} {first}'*:file:_files' ;;")
     lines += ["    help) _describe 'verb' verbs ;;", "  esac", "}",
-              'if [ "$funcstack[1]" = _polydem ]; then _polydem "$@"; else compdef _polydem polydem; fi', ""]
+              f'if [ "$funcstack[1]" = _{program} ]; then _{program} "$@"; else compdef _{program} {program}; fi', ""]
     return "\n".join(lines)
 
 
-def fish_text(verbs, entries):
+def fish_text(verbs, entries, program):
     """Completion for fish."""
     known = values_of(verbs, plain(entries))
 
@@ -169,29 +180,28 @@ def fish_text(verbs, entries):
         """How a value is completed."""
         return f" -x -a '{' '.join(known[value])}'" if value in known else " -r" if value else ""
 
-    lines = ["# Tab completion of polydem for fish"]
+    lines = [f"# Tab completion of {program} for fish"]
     for verb in verbs:
-        lines.append(f"complete -c polydem -n __fish_use_subcommand -f -a {verb.name} -d {quoted(verb.meaning)}")
+        lines.append(f"complete -c {program} -n __fish_use_subcommand -f -a {verb.name} -d {quoted(verb.meaning)}")
         seen = f"-n '__fish_seen_subcommand_from {verb.name}'"
-        lines += [f"complete -c polydem {seen} -a {choice}" for choice in verb.choices]
+        lines += [f"complete -c {program} {seen} -a {choice}" for choice in verb.choices]
         for name, value, meaning in verb.options:
             short = "-s" if len(name) == 2 else "-o"
             form = f"-l {name[2:]}" if name.startswith("--") else f"{short} {name[1:]}"
-            lines.append(f"complete -c polydem {seen} {form}{taken(value)} -d {quoted(meaning)}")
+            lines.append(f"complete -c {program} {seen} {form}{taken(value)} -d {quoted(meaning)}")
     return "\n".join([*lines, ""])
 
 
-def man_text(verbs, version):
+def man_text(verbs, version, program):
     """Man page in the macros `man`."""
     def escaped(text):
         text = text.replace("\\", "\\e").replace("-", "\\-").replace("'", "\\(aq").replace("`", "\\(ga")
         return f"\\&{text}" if text.startswith(".") else text
 
-    lines = [f'.TH POLYDEM 1 "" "polydem {version}" "User Commands"', ".SH NAME",
-             "polydem \\- discrete elements for convex polygons in two dimensions", ".SH SYNOPSIS",
-             ".B polydem", ".I VERB", "[\\fIARGUMENTS\\fR]", ".SH DESCRIPTION",
-             "polydem simulates granular matter made of convex polygons, and compares algorithms of neighbour search.",
-             "A namelist describes a simulation; results are folders of HDF5 files.", ".SH VERBS"]
+    short, *purpose = PURPOSES[program]
+    lines = [f'.TH {program.upper()} 1 "" "polydem {version}" "User Commands"', ".SH NAME", f"{program} \\- {short}",
+             ".SH SYNOPSIS", f".B {program}", ".I VERB", "[\\fIARGUMENTS\\fR]", ".SH DESCRIPTION", *purpose,
+             ".SH VERBS"]
     for verb in verbs:
         lines += [f'.SS "{escaped(verb.call)}"', escaped(verb.meaning), ".nf"]
         lines += [escaped(line) if line else ".sp" for line in verb.lines] + [".fi"]
@@ -206,13 +216,15 @@ def man_text(verbs, version):
 
 def main():
     """Print the text that the command line asks for."""
-    kind, version, table, *files = sys.argv[1:]
-    verbs, entries = [read_verb(path) for path in files], read_entries(table)
-    texts = {"bash": bash_text, "zsh": zsh_text, "fish": fish_text, "man": lambda found, _: man_text(found, version)}
+    program, kind, version, *files = sys.argv[1:]
+    verbs = [read_verb(path) for path in files if path.endswith(".txt")]
+    entries = read_entries(path for path in files if path.endswith(".md"))
+    texts = {"bash": bash_text, "zsh": zsh_text, "fish": fish_text,
+             "man": lambda found, _, name: man_text(found, version, name)}
     if kind not in texts:
         sys.exit(f"there is no text {kind}, but {', '.join(texts)}")
     try:
-        sys.stdout.write(texts[kind](verbs, entries))
+        sys.stdout.write(texts[kind](verbs, entries, program))
         sys.stdout.flush()
     except BrokenPipeError:
         give_up(141)  # as a shell says of a program that nobody reads any more

@@ -4,6 +4,7 @@ module polydem_expand
    use polydem_fill_groups, only: store_grains, store_wall
    use polydem_group_instances, only: instance_t, new_instance
    use polydem_parts, only: parts_t
+   use polydem_namelist_entries, only: entries
    use polydem_resolve_entries, only: write_group
    use polydem_recipes, only: find_parts
    use polydem_settings, only: settings_t
@@ -34,13 +35,13 @@ contains
       if (allocated(error)) return
       text = scene_text(settings%given)
       do k = 1, size(parts%grains)
-         call new_instance('grains', instance)
+         call new_instance(entries, 'grains', instance)
          call store_grains(parts%grains(k), instance)
          call write_group(instance, group)
          text = text//group
       end do
       do k = 1, size(parts%walls)
-         call new_instance('wall', instance)
+         call new_instance(entries, 'wall', instance)
          call store_wall(parts%walls(k), instance)
          call write_group(instance, group)
          text = text//group

@@ -1,10 +1,10 @@
-"""Every namelist entry with every bad value: check_bad_entries.py PROGRAM ENTRIES.txt [--full].
+"""Every namelist entry with every bad value: check_bad_entries.py PROGRAM ENTRIES.txt... [--full].
 
-The entries are those of the table. Each gets values of a wrong type, negative, zero, huge and tiny ones, NaN, no value,
-lists in place of numbers and misspelt words, in a file and by --set, with each scene that uses it. Either the value is
-refused: code 2 and a message that names the entry, and its line or --set. Or it is legal: `check` ends with code 0, or
-with code 1 and the message of a guard that stops the run at its start, and prints no NaN and no infinity. A legal value
-of an entry that acts during a run is also run for some steps.
+The entries are those of the tables, that of runs first. Each gets values of a wrong type, negative, zero, huge and tiny
+ones, NaN, no value, lists in place of numbers and misspelt words, in a file and by --set, with each scene that uses it.
+Either the value is refused: code 2 and a message that names the entry, and its line or --set. Or it is legal: `check`
+ends with code 0, or with code 1 and the message of a guard that stops the run at its start, and prints no NaN and no
+infinity. A legal value of an entry that acts during a run is also run for some steps.
 
 Without --full a sample of all cases is tried, which has each row of the table.
 """
@@ -236,7 +236,7 @@ def call(program, folder, case, verb, *more):
         settings[case.name] = case.value
     path = Path(folder) / "case.nml"
     path.write_text(namelist(settings), encoding="utf-8")
-    command = [program, verb, str(path), *more]
+    command = [program + "_lab" * (verb == "bench"), verb, str(path), *more]
     if case.is_override:
         command += ["--set", f"{case.name}={case.value}"]
     began = time.monotonic()
@@ -313,10 +313,12 @@ def sample(cases):
 
 
 def main():
-    program, table = str(Path(sys.argv[1]).resolve()), sys.argv[2]
-    groups, rows = read_table(Path(table).read_text(encoding="utf-8"))
-    REPEATABLE.update(name for name, group in groups.items() if group.is_repeatable)
-    ROWS.extend(rows)
+    program = str(Path(sys.argv[1]).resolve())
+    for table in (Path(word) for word in sys.argv[2:] if word != "--full"):
+        groups, found = read_table(table.read_text(encoding="utf-8"), table.parent)
+        REPEATABLE.update(name for name, group in groups.items() if group.is_repeatable)
+        ROWS.extend(found)
+    rows = ROWS
     WORDS.update(entry_of(row.group, row.key) for row in rows if row.type == "word")
     cases = list(all_cases(rows))
     tried = [case for each in cases for case in each] if "--full" in sys.argv else sample(cases)

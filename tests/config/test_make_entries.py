@@ -1,13 +1,15 @@
 """The script that makes Fortran from the table of namelist entries: test_make_entries.py FOLDER_OF_CONFIG."""
 
 import sys
+import tempfile
 import unittest
+from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
 from generator.manual import manual  # noqa: E402
 from generator.pairs import pair_module, value_module  # noqa: E402
-from generator.settings import fill_module, settings_module, table_module  # noqa: E402
+from generator.settings import fill_module, lone_modules, settings_module, table_module  # noqa: E402
 from generator.table import TableError, read_table  # noqa: E402
 
 GOOD = """# Comment
@@ -22,8 +24,8 @@ dog | friends | name | 2 | required | - | dog | - | Other dogs
 group wall *: what is in the way
 wall | name | name | 1 | required | - | - | - | Name of the wall
 wall | height | real | 1 | 1 | m | - | - | Height
-group bench
-bench | names | path | 0 | - | - | - | - | Names
+group bag
+bag | names | path | 0 | - | - | - | - | Names
 """
 
 PAIRS = """group forces
@@ -55,8 +57,6 @@ class TestMakeEntries(unittest.TestCase):
 
     def test_a_repeatable_group_makes_an_array(self):
         table = read_table(GOOD)
-        self.assertIn("repeatable_groups(*) = [character(len=group_length) :: &\n      'dog', &\n      'wall']",
-                      table_module(*table))
         self.assertIn("type(dog_settings_t), allocatable :: dog(:)", settings_module(*table))
         self.assertIn("type(walk_settings_t) :: walk\n", settings_module(*table))
         self.assertIn("allocate (settings%dog(count(instances%group == 'dog')))", fill_module(*table))
@@ -120,12 +120,25 @@ class TestMakeEntries(unittest.TestCase):
         with self.assertRaisesRegex(TableError, "line 6: there is no block sice above it"):
             read_table(text.replace("include size\ngroup", "include sice\ngroup"))
 
+    def test_a_group_that_stands_alone_has_modules_of_its_own(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "other.txt").write_text(GOOD, encoding="utf-8")
+            made = lone_modules(*read_table("lists other.txt\nlist more = {ways} none\ngroup race: who is first\n"
+                                            "race | way | word | 0 | required | - | {more} | - | Ways\n"
+                                            "race | laps | integer | 1 | 3 | - | > 0 | - | Laps\n", Path(folder)))
+        self.assertEqual(list(made), ["race_table", "race_settings", "fill_race"])
+        self.assertIn("'slow fast none'", made["race_table"])
+        self.assertIn("module polydem_race_table\n", made["race_table"])
+        self.assertIn("type, extends(source_locations_t) :: race_settings_t\n", made["race_settings"])
+        self.assertIn("use polydem_kinds, only: ip\n", made["race_settings"])
+        self.assertIn("   public :: fill_race\n", made["fill_race"])
+
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
                                   ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
                                   ("{ways} none", "{way} none", "line 4: there is no list way above it"),
                                   ("way | word", "way | wort", "line 4: there is no entry of type wort"),
-                                  ("group bench", "group other", "line 14: the row is not in its group"),
+                                  ("group bag", "group other", "line 14: the row is not in its group"),
                                   ("name | name | 1 | required", "name | name | 1 | -", "line 8: the first row of a"),
                                   ("dog | -", "walk | -", "friends of dog is the name of a group walk, which is not"),
                                   ("| Height", "| Height | < three: in mm?", "line 12: < three: in mm. is no usual"),

@@ -34,8 +34,9 @@ class Names:
     #: Files of a result by kind: patterns within its folder
     FILES = {"trajectory": "trajectory_*.h5", "profile": "profile.h5", "trace": "trace.h5", "steps": "steps.h5",
              "overlaps": "overlaps.csv", "checkpoint": "checkpoint_?.h5", "sample": "*.h5"}
-    #: The program in a build folder, the namelists in the sources, among them that of the bed to pack drums from
-    PLACES = {"program": "src/app/polydem", "inputs": "inputs", "patch": "bench/patch.nml"}
+    #: The programs in a build folder, the namelists in the sources, among them that of the bed to pack drums from
+    PLACES = {"program": "src/app/polydem", "laboratory": "src/app/polydem", "inputs": "inputs",
+              "patch": "bench/patch.nml"}
 
     def entry(self, name):
         """An entry group.key; None if it was removed."""
@@ -113,4 +114,5 @@ PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "sce
                 # The settings of a sample, as text; points and normals of contacts, and what follows from points
                 data={"sample/case/input": None, "trajectory/contacts/point": None, "trajectory/contacts/normal": None,
                       **{f"trajectory/series/{name}": None for name in (
-                          "stress_xx", "stress_xy", "stress_yx", "stress_yy", "inertial_number")}})
+                          "stress_xx", "stress_xy", "stress_yx", "stress_yy", "inertial_number")}},
+                places={"laboratory": "src/app/polydem_lab"})

@@ -55,9 +55,9 @@ class Side:
         """The working folder of all runs."""
         return self.folder / "work"
 
-    def program(self, preset):
-        """The built program without MPI (release) or with it (mpi)."""
-        return self.folder / preset / self.names.place("program")
+    def program(self, preset, what="program"):
+        """The built program without MPI (release) or with it (mpi), or that of the laboratory."""
+        return self.folder / preset / self.names.place(what)
 
     def build(self, say, frozen):
         """Build what is needed; what is `frozen` and was built once is not looked at again."""
@@ -111,7 +111,7 @@ class Side:
 
     def start(self, words, ranks=None, threads=1):
         """Start the program, with MPI if there is a number of ranks."""
-        command = [str(self.program("release"))]
+        command = [str(self.program("release", "laboratory" if words[0] == "replay" else "program"))]
         if ranks is not None:
             command = ["mpirun", "-n", str(ranks), str(self.program("mpi"))]
         return subprocess.Popen([*command, *words, self.names.option("--threads"), str(threads)], cwd=self.work,

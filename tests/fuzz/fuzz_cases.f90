@@ -4,15 +4,17 @@ module fuzz_cases
    use hostile_fields, only: field_t, new_field, new_text, spoil_fields
    use hostile_file, only: write_hostile_file
    use spoilt_checkpoint, only: go_on_from, put_behind_seal, sound_checkpoint
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip
    use polydem_namelist_entries, only: choices_of
    use polydem_random, only: random_t
+   use polydem_read_bench, only: read_bench_text
    use polydem_read_settings, only: read_settings_text
    use polydem_replay, only: replay_trace
    use polydem_result_info, only: describe_result
-   use polydem_settings, only: bench_settings_t, settings_t
+   use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
    use polydem_time_step, only: advance
@@ -47,7 +49,7 @@ contains
       text = sound
       call damage(random, text)
       if (index(sound, '&bench') > 0) then
-         call read_settings_text('spoilt.nml', text, none, bench, error)
+         call read_bench_text('spoilt.nml', text, none, bench, error)
          return
       end if
       call read_settings_text('spoilt.nml', text, none, settings, error)

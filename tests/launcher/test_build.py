@@ -59,6 +59,13 @@ class Build(Toy):
         words = ["-m", "polydem_post", "accuracy", "--program", program, "my scene.nml", "--tolerance", "1e-3"]
         self.assertEqual((code, output), (0, "".join(f"<{word}>\n" for word in words)))
 
+    def test_benches_and_replays_are_done_by_the_program_of_the_laboratory(self):
+        self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\nadd_executable(polydem_lab lab.f90)\n")
+        self.write("src/app/lab.f90", PROGRAM.replace("'<'", "'['"))
+        for verb in ("bench", "replay"):
+            self.assertEqual(self.call(verb, "a b.nml")[:2], (0, f"[{verb}>\n[a b.nml>\n"))
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build/release/src/app/polydem")))
+
     def test_a_changed_source_is_built_and_an_error_shown(self):
         self.call("--version")
         self.write("src/app/main.f90", PROGRAM.replace("'<'", "'['"))

@@ -15,7 +15,6 @@ import unittest
 from pathlib import Path
 
 LAUNCHER = Path()
-PLACES = ("src/app/help", "postproc/src/polydem_post/command_line/help", "postproc/src/polydem_lab/command_line/help")
 
 
 def call(*words, text=None):
@@ -76,6 +75,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "integrate."),
                          {f"integrate.{key}=" for key in of["integrate"]})
         self.assertIn("scene.seed=", self.completed("polydem", "check", "a.nml", "--set", ""))
+        self.assertIn("bench.repeats=", self.completed("polydem", "bench", "a.nml", "--set", "bench."))
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "wall.floor."),
                          {f"wall.floor.{key}=" for key in of["wall"]})
         self.assertEqual(self.completed("polydem", "run", "a.nml", "--set", "wall."), set())

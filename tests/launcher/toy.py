@@ -83,7 +83,7 @@ for name in gfortran cmake ninja git h5fc; do ln -sf "$(PATH=$REAL_PATH command 
 MOST_ATTEMPTS = 100
 
 # Where the help texts of the verbs are
-HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/command_line/help",
+HELP_PLACES = ("src/app/help", "src/laboratory/help", "postproc/src/polydem_post/command_line/help",
                "postproc/src/polydem_lab/command_line/help")
 
 # What ends an mpirun whose ranks have ended

@@ -36,6 +36,7 @@ OTHERS = {
     "README.md",
     "inputs/README.md",
     "inputs/accuracy.md",
+    "inputs/bench/entries.md",
     "inputs/checks.md",
     "inputs/entries.md",
     "inputs/getting_started.md",

@@ -266,7 +266,8 @@ def test_whole_steps_stand_beside_the_replay_in_figure_9(tmp_path):
 
 
 def test_no_two_finders_look_alike():
-    text = (Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src" / "config" / "entries.txt").read_text(encoding="utf-8")
+    text = "".join((Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src" / layer / "entries.txt").read_text(encoding="utf-8")
+                   for layer in ("config", "laboratory"))
     lists = dict(re.findall(r"^list (\w+) = (.*)$", text, re.MULTILINE))
     words = " ".join(lists.values()).split()
     finders = [word for word in words if word.startswith(("quadtree", "sort_and", "linked", "verlet", "two_level")) or

@@ -28,6 +28,7 @@ inside env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-rec
   >"$work/apt.log" 2>&1 || { cat "$work/apt.log"; exit 1; }
 
 inside polydem --version
+inside polydem_lab --version >/dev/null
 inside polydem check /usr/share/polydem/inputs/first.nml >/dev/null
 inside sh -c 'cd /root && polydem run /usr/share/polydem/inputs/stack.nml --threads 1' | tail -n 1
 inside sh -c 'cd /root && polydem info --check results/stack' >/dev/null

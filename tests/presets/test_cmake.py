@@ -60,7 +60,9 @@ class Compiler(Scene):
                 self.assertEqual(re.findall(r" -O\S+", entry["command"]), [" -O3"])
         code, output, message = call(CMAKE, "--build", self.folder, "--target", "shell_texts")
         self.assertEqual(code, 0, output + message)
-        self.assertIn(".SH ENVIRONMENT", (self.folder / "src/packaging/polydem.1").read_text(encoding="utf-8"))
+        for name in ("polydem", "polydem_lab"):
+            text = (self.folder / f"src/packaging/{name}.1").read_text(encoding="utf-8")
+            self.assertTrue(text.startswith(f".TH {name.upper()} ") and ".SH ENVIRONMENT" in text)
 
 
 class Revision(Scene):
@@ -103,11 +105,12 @@ class Revision(Scene):
 
 
 class Install(Scene):
-    def test_an_installed_program_runs(self):
+    def test_installed_programs_run(self):
         code, _, message = call(CMAKE, "--install", BUILD, "--prefix", self.folder)
         self.assertEqual(code, 0, message)
-        program = self.folder / "bin/polydem"
+        program, laboratory = (self.folder / "bin" / name for name in ("polydem", "polydem_lab"))
         self.assertEqual(call(program, "--version"), call(BUILD / "src/app/polydem", "--version"))
+        self.assertEqual(call(laboratory, "--version"), call(program, "--version"))
         self.assertEqual(call(program, "--version")[0], 0)
         # The launcher, which may have started this test, has another name for the program.
         own = {name: value for name, value in os.environ.items() if name != "POLYDEM_CALL"}
@@ -115,10 +118,14 @@ class Install(Scene):
         code, output, message = call(program, "check", self.folder / "share/polydem/inputs/stack.nml", cwd=self.folder)
         self.assertEqual(code, 0, output + message)
         self.assertTrue((self.folder / "share/doc/polydem/LICENSE").exists())
-        for place in ("man/man1/polydem.1", "bash-completion/completions/polydem", "zsh/site-functions/_polydem",
-                      "fish/vendor_completions.d/polydem.fish"):
-            self.assertIn("--walltime" if "fish" not in place else "-l walltime",
-                          (self.folder / "share" / place).read_text(encoding="utf-8").replace("\\-", "-"))
+        code, _, message = call(laboratory, "replay", SOURCES / "tests/laboratory/traces/drum_cut.h5", "--steps", "1")
+        self.assertEqual(code, 0, message)
+        for name, option, other in (("polydem", "walltime", "oracle"), ("polydem_lab", "oracle", "walltime")):
+            for place in (f"man/man1/{name}.1", f"bash-completion/completions/{name}",
+                          f"zsh/site-functions/_{name}", f"fish/vendor_completions.d/{name}.fish"):
+                text = (self.folder / "share" / place).read_text(encoding="utf-8").replace("\\-", "-")
+                self.assertIn(f"--{option}" if "fish" not in place else f"-l {option}", text)
+                self.assertNotIn(other, text)
 
     @unittest.skipUnless(shutil.which("dpkg-deb"), "no dpkg-deb: nothing can be packed")
     def test_a_package_has_the_program_with_its_libraries_as_dependencies(self):
@@ -129,7 +136,8 @@ class Install(Scene):
         for name in ("libgfortran5", "libgomp1", "libhdf5-", "libhdf5-fortran"):
             self.assertIn(name, needs)
         self.assertEqual(call("dpkg-deb", "-x", package, self.folder / "root")[0], 0)
-        self.assertEqual(call(self.folder / "root/usr/bin/polydem", "--version")[0], 0)
+        for name in ("polydem", "polydem_lab"):
+            self.assertEqual(call(self.folder / "root/usr/bin" / name, "--version")[0], 0)
         self.assertTrue((self.folder / "root/usr/share/polydem/inputs/first.nml").exists())
 
 

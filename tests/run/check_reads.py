@@ -117,7 +117,9 @@ class Case:
         """Do a verb; return exit code, standard output, standard error."""
         if words.split()[0] in PYTHON_VERBS:
             return in_python(words.split(), environment, self.data.parent)
-        command = [*MPIRUN, "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
+        command = [self.program + "_lab" * words.startswith(("replay", "bench"))]
+        if ranks:
+            command = [*MPIRUN, "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]]
         return execute([*command, *words.split()], {**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment},
                        self.data.parent)
 

@@ -40,9 +40,14 @@ FROM_FILE = """\
 """
 
 
+def command(words):
+    """The words of a call; the program of the laboratory lies beside the other one."""
+    return [PROGRAM + "_lab" * (words[0] in ("replay", "bench")), *words]
+
+
 def call(*words):
     """Exit code, output and message of a call."""
-    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=600, check=False,
+    done = subprocess.run(command(words), capture_output=True, text=True, timeout=600, check=False,
                           env={**os.environ, "OMP_NUM_THREADS": "1"})
     return done.returncode, done.stdout, done.stderr
 
@@ -258,7 +263,7 @@ def test_control_characters_of_words_and_namelists_do_not_reach_the_screen():
              ("run", f"{evil}/{evil}.nml"), ("run", f"{evil}/{evil}.nml"), ("run", "x", evil),
              ("run", "scene.nml", "--threads", evil), ("run", "scene.nml", "--walltime", evil))
     for words in calls:
-        done = subprocess.run([PROGRAM, *words], capture_output=True, check=False)
+        done = subprocess.run(command(words), capture_output=True, check=False)
         for shown in done.stdout, done.stderr:
             assert not set(shown) & (set(range(32)) - {10}), (words, shown)
             assert "\u202e" not in shown.decode("utf-8") and "\x9b" not in shown.decode("utf-8"), (words, shown)

@@ -19,9 +19,9 @@ TOP_LEVEL = FOLDERS | {".ci", ".editorconfig", ".fortitude.toml", ".fprettify.rc
 #: What no statement may have: pattern, path of files that may have it, message
 FORBIDDEN = [(re.compile(pattern), re.compile(allowed), message) for pattern, allowed, message in (
     (r"^(if *\(.*\) *)?((error +)?stop\b(?! *[=%(])|call +(exit|abort)\b)", "^src/app/",
-     "only the program in src/app stops"),
+     "only the programs stop: by their end in src/app"),
     (r"\bcall +omp_set_num_threads\b", "^src/(app|laboratory|run)/",
-     "the layers app, laboratory and run set the threads"),
+     "the folders app, laboratory and run set the threads"),
     (r"^(save|data)\b(?! *[=%(])|^[^:]*, *save\b[^:]*::", "^$", "no save, no data: state lives in arguments"),
     (r"^[^:]*, *pointer\b[^:]*::", "^src/platform/", "no pointers: use allocatables and integer links"),
     (r"\bgo *to\b", "^$", "go to is not used here"),

@@ -2,7 +2,7 @@
 module polydem_blame_entry
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: instance_t, row_of
-   use polydem_namelist_entries, only: is_repeatable
+   use polydem_namelist_entries, only: entries, is_repeatable
    use polydem_strings, only: to_text
    implicit none
    private
@@ -29,7 +29,7 @@ contains
             row = row_of(instance, other)
       end if
       place = instance%values(row)%place
-      if (instance%line > 0 .and. .not. instance%values(row)%is_given .and. .not. is_repeatable(instance%group)) &
+      if (instance%line > 0 .and. .not. (instance%values(row)%is_given .or. is_repeatable(entries, instance%group))) &
          place = place//':'//to_text(instance%line)
       call raise(error, input_error, place//': '''//key//''' in &'// &
                  trim(trim(instance%group)//' '//instance%name)//' '//problem)

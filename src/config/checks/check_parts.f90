@@ -6,7 +6,7 @@ module polydem_check_parts
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_missing_entries, only: example_of
+   use polydem_missing_entries, only: missing_group, run_example
    use polydem_namelist_entries, only: entries, first_row
    use polydem_settings, only: grains_settings_t, settings_t
    use polydem_strings, only: quoted, split_words, suggestion, to_text
@@ -68,8 +68,7 @@ contains
             end do
          else if (settings%scene%bodies_file == '' .and. size(settings%grains) + size(settings%source) == 0) then
             if (.not. scene%is_given .and. size(settings%wall) == 0) then
-               call raise(error, input_error, scene%place//': the group &scene is missing; for example: '// &
-                  example_of('scene'))
+               call raise(error, input_error, scene%place//': '//missing_group('scene', run_example))
             else if (size(settings%wall) == 0) then
                call raise(error, input_error, scene%place//': ''name'' in &scene is required without groups '// &
                   '&grains and without ''bodies_file'''//suggestion('', recipes()))

@@ -1,12 +1,15 @@
 !> What is said of a required entry that is not given, or of its group.
 module polydem_missing_entries
-   use polydem_group_instances, only: instance_t
-   use polydem_namelist_entries, only: bench_group, entry_t, first_row
+   use polydem_group_instances, only: instance_t, row_of
+   use polydem_namelist_entries, only: entry_t
    use polydem_namelist_values, only: label
    use polydem_strings, only: quoted, split_words, suggestion
    implicit none
    private
-   public :: example_of, missing_text
+   public :: missing_group, missing_text
+
+   !> A short text of a run
+   character(len=*), parameter, public :: run_example = "&scene name = 'bed' bodies = 100 / &integrate duration = 1.0 /"
 
 contains
 
@@ -17,27 +20,30 @@ contains
       type(instance_t), intent(in) :: instance
       character(len=:), allocatable :: text
 
-      if (.not. instance%is_given) then
-         text = 'the group &'//trim(entry%group)//' is missing; for example: '//example_of(entry%group)
-      else
-         text = label(entry)//' is required'//reason(entry, instance)//expected(entry)
-      end if
+      text = label(entry)//' is required'//reason(entry, instance)//expected(entry)
    end function missing_text
 
-   !> A short example of a group with required entries, for a message
-   pure function example_of(group) result(text)
+   !> Message about a group that is missing, without the name of the file
+   pure function missing_group(group, example) result(text)
       !> Name of the group
       character(len=*), intent(in) :: group
+      !> A short text that has the group
+      character(len=*), intent(in) :: example
       character(len=:), allocatable :: text
 
-      select case (group)
-      case ('scene')
-         text = "&scene name = 'bed' bodies = 100 /"
-      case (bench_group)
-         text = "&bench scenes = 'inputs/gas.nml' names = 'gas' finders = 'two_level' /"
-      case default
-         text = '&integrate duration = 1.0 /'
-      end select
+      text = 'the group &'//trim(group)//' is missing; for example: '//example_of(group, example)
+   end function missing_group
+
+   !> A group of an example
+   pure function example_of(group, example) result(text)
+      !> Name of the group
+      character(len=*), intent(in) :: group
+      !> A short text that has the group
+      character(len=*), intent(in) :: example
+      character(len=:), allocatable :: text
+
+      text = example(max(1, index(example, '&'//trim(group)//' ')):)
+      text = text(:index(text, ' /') + 1)
    end function example_of
 
    !> Condition under which an entry is required, such as ' with name = 'hopper''; empty if it is always required
@@ -49,7 +55,7 @@ contains
       text = ''
       if (entry%needs == '') return
       key = entry%needs(:index(entry%needs, ':') - 1)
-      text = ' with '//key//' = '//quoted(instance%values(first_row(entry%group, key))%text)
+      text = ' with '//key//' = '//quoted(instance%values(row_of(instance, key))%text)
    end function reason
 
    !> Description of a required entry: choices, or meaning, bounds and unit; for the end of a message

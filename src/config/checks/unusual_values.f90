@@ -3,7 +3,7 @@
 module polydem_unusual_values
    use polydem_group_instances, only: instance_t
    use polydem_kinds, only: wp
-   use polydem_namelist_entries, only: entries, entry_t
+   use polydem_namelist_entries, only: entry_t
    use polydem_namelist_values, only: list_text
    use polydem_strings, only: quoted, split_words, text_t
    implicit none
@@ -16,7 +16,9 @@ module polydem_unusual_values
 contains
 
    !> List a warning about the first unusual value of each entry that is given and in use.
-   pure subroutine list_unusual(instances, warnings)
+   pure subroutine list_unusual(table, instances, warnings)
+      !> Table of entries
+      type(entry_t), intent(in) :: table(:)
       !> Instances of all groups with their values
       type(instance_t), intent(in) :: instances(:)
       !> The warnings
@@ -26,7 +28,7 @@ contains
       allocate (warnings(0))
       do i = 1, size(instances)
          do row = lbound(instances(i)%values, 1), ubound(instances(i)%values, 1)
-            associate (entry => entries(row), value => instances(i)%values(row))
+            associate (entry => table(row), value => instances(i)%values(row))
                if (entry%usual == '' .or. .not. (value%is_given .and. value%is_active)) cycle
                do k = 1, size(value%reals)
                   if (is_usual(entry, k, value%reals(k))) cycle

@@ -4,8 +4,6 @@ import textwrap
 
 from .fortran import component, is_optional, literal, module
 
-#: Group of a bench; all other groups belong to a run
-BENCH = "bench"
 #: Groups that a recipe makes, which expand prints
 PARTS = ("grains", "wall")
 
@@ -15,7 +13,7 @@ def first_rows(rows, group):
     return list({row.key: row for row in reversed(rows) if row.group == group}.values())[::-1]
 
 
-def table_module(groups, rows):
+def table_module(groups, rows, name="entry_table"):
     """The table as constants, one per group: a statement cannot have more than 255 lines."""
     body = ""
     for group in groups:
@@ -32,11 +30,7 @@ def table_module(groups, rows):
                  + ", &\n".join(entries) + "]\n\n")
     names = ", &\n      ".join(f"{group}_entries" for group in groups)
     body += f"   !> The table of entries\n   type(entry_t), parameter :: entries(*) = [ &\n      {names}]\n\n"
-    names = "".join(f", &\n      '{name}'" for name, group in groups.items() if group.is_repeatable)[1:]
-    body += ("   !> Groups that a file may contain several times\n"
-             "   character(len=*), parameter :: repeatable_groups(*) = [character(len=group_length) ::" + names + "]\n")
-    return module("entry_table", "Table of namelist entries.",
-                  ["namelist_entry, only: entry_t, group_length, required"], ["entries", "repeatable_groups"], body)
+    return module(name, "Table of namelist entries.", ["namelist_entry, only: entry_t, required"], ["entries"], body)
 
 
 def blocks_of(groups):
@@ -59,25 +53,28 @@ def type_of(name, comment, rows, block, base=""):
     return f"{comment}\n   type{base} :: {name}_settings_t\n{components}\n   end type {name}_settings_t\n\n"
 
 
-def settings_module(groups, rows):
-    """One type per group, one of all groups of a run, and one of a bench."""
-    blocks = blocks_of(groups)
+def group_types(groups, rows, base=""):
+    """One type per block and per group."""
     body = "".join(type_of(name, "Entries that several groups include", block.rows, block.base)
-                   for name, block in blocks.items())
+                   for name, block in blocks_of(groups).items())
     for name, (meaning, _, block) in groups.items():
-        body += type_of(name, f"Group &{name}" + (f": {meaning}" if meaning else ""), rows, block,
-                        ", extends(source_locations_t)" if name == BENCH else "")
+        body += type_of(name, f"Group &{name}" + (f": {meaning}" if meaning else ""), rows, block, base)
+    return body
+
+
+def settings_module(groups, rows):
+    """One type per group, and one of all groups."""
+    body = group_types(groups, rows)
     body += "   !> All settings of a run. They do not change after reading\n"
     body += "   type, extends(source_locations_t) :: settings_t\n"
     for group, (_, is_repeatable, *_) in groups.items():
-        if group != BENCH:
-            kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
-            body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
-                     f"      type({group}_settings_t){kind} :: {group}{shape}\n")
+        kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
+        body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
+                 f"      type({group}_settings_t){kind} :: {group}{shape}\n")
     body += "   end type settings_t\n"
-    return module("settings", "Settings of a run and of a bench: one type per namelist group.",
+    return module("settings", "Settings of a run: one type per namelist group.",
                   ["kinds, only: ip, wp", "source_locations, only: source_locations_t", "strings, only: text_t"],
-                  ["settings_t", *(f"{name}_settings_t" for name in (*blocks, *groups))], body)
+                  ["settings_t", *(f"{name}_settings_t" for name in (*blocks_of(groups), *groups))], body)
 
 
 def assignment(row):
@@ -99,11 +96,19 @@ def storage(row):
     return f"      call store_value(instance, '{row.key}', {kinds.get(row.type, 'text')}={value})\n"
 
 
+def fill_procedure(rows, group):
+    """The procedure that fills the type of a group."""
+    copies = "".join(assignment(row) for row in first_rows(rows, group))
+    return (f"   !> Fill a group &{group}.\n   pure subroutine fill_{group}(instance, settings)\n"
+            "      !> The group with its values\n      type(instance_t), intent(in) :: instance\n"
+            f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
+            f"{copies}   end subroutine fill_{group}\n")
+
+
 def fill_module(groups, rows):
-    """Procedures that fill the types, one per group, and the one that fills all groups of a run."""
-    run = [group for group in groups if group != BENCH]
+    """Procedures that fill the types, one per group, and the one that fills all groups."""
     allocations, cases = "", ""
-    for group in run:
+    for group in groups:
         place = ""
         if groups[group].is_repeatable:
             place = "(instances(k)%number)"
@@ -115,12 +120,7 @@ def fill_module(groups, rows):
              "      !> Settings to fill\n      type(settings_t), intent(inout) :: settings\n      integer :: k\n\n"
              f"{allocations}      do k = 1, size(instances)\n         select case (instances(k)%group)\n{cases}"
              "         end select\n      end do\n   end subroutine fill_groups\n"]
-    for group in groups:
-        copies = "".join(assignment(row) for row in first_rows(rows, group))
-        parts.append(f"   !> Fill a group &{group}.\n   pure subroutine fill_{group}(instance, settings)\n"
-                     "      !> The group with its values\n      type(instance_t), intent(in) :: instance\n"
-                     f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
-                     f"{copies}   end subroutine fill_{group}\n")
+    parts += [fill_procedure(rows, group) for group in groups]
     for group in (group for group in PARTS if group in groups):
         copies = "".join(storage(row) for row in first_rows(rows, group))
         parts.append(f"   !> Store a group &{group} in the values of an instance.\n"
@@ -133,5 +133,19 @@ def fill_module(groups, rows):
     used = f"group_instances, only: instance_t, row_of{', store_value' * bool(stores)}"
     return module("fill_groups", "Copies the values of the table of entries to the settings, and those of parts back.",
                   [used, "settings, only: settings_t", *uses],
-                  ["fill_groups", f"fill_{BENCH}", *stores], "",
-                  "\n".join(parts))
+                  ["fill_groups", *stores], "", "\n".join(parts))
+
+
+def lone_modules(groups, rows):
+    """Table, settings and filling of a group that is none of a run."""
+    (name,) = groups
+    body = group_types(groups, rows, ", extends(source_locations_t)")
+    kinds = ", ".join(kind for kind in ("ip", "wp") if f"({kind})" in body)
+    settings = module(f"{name}_settings", f"Settings of a {name}.",
+                      [f"kinds, only: {kinds}", "source_locations, only: source_locations_t", "strings, only: text_t"],
+                      [f"{name}_settings_t"], body)
+    fill = module(f"fill_{name}", "Copies the values of the table of entries to the settings.",
+                  [f"{name}_settings, only: {name}_settings_t", "group_instances, only: instance_t, row_of"],
+                  [f"fill_{name}"], "", fill_procedure(rows, name))
+    return {f"{name}_table": table_module(groups, rows, f"{name}_table"), f"{name}_settings": settings,
+            f"fill_{name}": fill}

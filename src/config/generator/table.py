@@ -2,6 +2,7 @@
 
 import re
 from collections import namedtuple
+from pathlib import Path
 
 Row = namedtuple("Row", "group key type count default unit allowed needs meaning usual mixed")
 #: Fields that may be left out at the end of a row
@@ -29,8 +30,8 @@ class TableError(Exception):
     """A table that cannot be understood."""
 
 
-def read_table(text):
-    """Groups by name, and all rows."""
+def read_table(text, folder=Path()):
+    """Groups by name, and all rows, of a table in a folder."""
     groups, lists, rows, blocks, block = {}, {}, [], {}, ""
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
@@ -53,8 +54,9 @@ def read_table(text):
                 groups[name] = groups[name]._replace(block=base)
                 rows += [row._replace(group=name) for row in base.rows]
         elif word == "list":
-            name, _, words = rest.partition(" = ")
-            lists[name] = with_lists(words.strip(), lists, number)
+            read_lists([line], lists, number)
+        elif word == "lists":
+            read_lists((folder / rest).read_text(encoding="utf-8").splitlines(), lists, number)
         elif block:
             earlier = blocks[block].rows
             blocks[block] = blocks[block]._replace(rows=(*earlier, read_row(line, lists, number, blocks, earlier)))
@@ -65,6 +67,15 @@ def read_table(text):
         if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
             raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def read_lists(lines, lists, number):
+    """Add the lists among some lines."""
+    for line in lines:
+        word, _, rest = line.partition(" ")
+        if word == "list":
+            name, _, words = rest.partition(" = ")
+            lists[name] = with_lists(words.strip(), lists, number)
 
 
 def included(text, blocks, number):

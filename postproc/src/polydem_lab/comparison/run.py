@@ -68,6 +68,11 @@ class Tools:
         """The program in double precision."""
         return self.programs["double"]
 
+    @property
+    def laboratory(self) -> Path:
+        """The program of benches and replays, which lies beside it."""
+        return self.program.with_name("polydem_lab")
+
 
 @dataclass
 class Comparison:
@@ -114,7 +119,7 @@ class Comparison:
             if not self.state:
                 raise ResultError(f"{self.folder}: there is nothing to report yet")
             return
-        base = base_of(self.tools.program)
+        base = base_of(self.tools.program, self.tools.laboratory)
         if self.state.get("base") != base:
             if self.state:
                 self.say("what is there was made by another program or machine and is made again")
@@ -175,7 +180,8 @@ class Comparison:
                 folder = Path(place) / "trial"
                 namelist = write(Path(place) / "trial.nml", TRIAL.format(folder=folder))
                 log = Path(place) / "trial.txt"
-                if self._call([str(self.tools.program), "bench", str(namelist)], log, ROOT, OMP_NUM_THREADS="1") != 0:
+                command = [str(self.tools.laboratory), "bench", str(namelist)]
+                if self._call(command, log, ROOT, OMP_NUM_THREADS="1") != 0:
                     raise ResultError(f"the calibration failed: {log.read_text(encoding='utf-8')[-500:]}")
                 self.state["rates"] = vars(measured_rates(folder))
             self._write()
@@ -265,17 +271,17 @@ class Comparison:
 
     def commands(self, piece: Piece) -> list:
         """[(command, folder in which it runs, exit codes that are good)]"""
-        folder, program = self.folder / piece.name, str(self.tools.program)
+        folder, laboratory = self.folder / piece.name, str(self.tools.laboratory)
         own = [sys.executable, "-m", "polydem_post"]
         if piece.bench:
             namelist = write(self.folder / f"{piece.name}.nml", self._available(piece.bench).written(folder))
-            return [([program, "bench", str(namelist)], ROOT, (0,))]
+            return [([laboratory, "bench", str(namelist)], ROOT, (0,))]
         if piece.kind == "cache":
             scenes, finders = piece.options
             traces = self.folder / piece.needs[0]
             made = {path.parent.name for path in (traces / "traces").glob("*/trace.h5")}
             scenes = ",".join(name for name in scenes.split(",") if name in made)
-            return [([*own, "cache", str(traces), "--program", program, "--finders", finders, "--scenes", scenes],
+            return [([*own, "cache", str(traces), "--program", laboratory, "--finders", finders, "--scenes", scenes],
                      ROOT, (0,))]
         if piece.kind == "precision":
             repeats, *scenes = piece.options
@@ -331,11 +337,11 @@ def environment() -> dict:
     return {"OMP_PROC_BIND": "close", "OMP_PLACES": "cores", **os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def base_of(program: Path) -> dict:
-    """The program and the machine: what pieces must have in common."""
+def base_of(program: Path, laboratory: Path) -> dict:
+    """The programs and the machine: what pieces must have in common."""
     try:
         told = subprocess.run([str(program), "--version"], capture_output=True, text=True, check=True).stdout
-        digest = hashlib.sha256(Path(program).read_bytes()).hexdigest()
+        digest = hashlib.sha256(program.read_bytes() + laboratory.read_bytes()).hexdigest()
     except (OSError, subprocess.CalledProcessError) as error:
         raise ResultError(f"{program}: cannot be run ({error})") from error
     return {

@@ -1,4 +1,4 @@
-# Script: write the module RESULT with the texts of FILES, VERB.txt for each verb.
+# Script: write RESULT with the module MODULE, which has the texts of FILES, VERB.txt for each verb.
 set(cases "")
 foreach(file IN LISTS FILES)
   get_filename_component(verb "${file}" NAME_WE)
@@ -7,8 +7,8 @@ foreach(file IN LISTS FILES)
   string(REGEX REPLACE "([^\n]*)\n" "   '\\1'//n// &\n" text "${text}")
   string(APPEND cases "      case ('${verb}')\n         text = &\n${text}   ''\n")
 endforeach()
-file(WRITE "${RESULT}" "!> The help text of each verb, from src/app/help
-module polydem_help_texts
+file(WRITE "${RESULT}" "!> The help text of each verb of a program
+module ${MODULE}
    implicit none
    private
    public :: help_text
@@ -28,5 +28,5 @@ ${cases}      case default
       end select
    end function help_text
 
-end module polydem_help_texts
+end module ${MODULE}
 ")

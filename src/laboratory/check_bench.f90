@@ -1,9 +1,8 @@
 !> Checks of the lists of a bench against each other. The table of entries holds the checks of single entries.
 module polydem_check_bench
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_namelist_entries, only: bench_group
    use polydem_source_locations, only: overrides_of, place_of
-   use polydem_settings, only: bench_settings_t
    use polydem_strings, only: to_text, quoted, text_t
    implicit none
    private
@@ -26,7 +25,7 @@ contains
       integer :: k
 
       if (size(bench%names) /= size(bench%scenes)) call raise_at('names', 'has '//to_text(size(bench%names))// &
-         ' values, but there are '//to_text(size(bench%scenes))//" in 'scenes'"//overrides_of(bench, bench_group), &
+         ' values, but there are '//to_text(size(bench%scenes))//" in 'scenes'"//overrides_of(bench, 'bench'), &
          bench, error)
       if (max(size(bench%names), size(bench%finders), size(bench%threads)) > longest_list) call raise_at('names', &
          'and other lists cannot have more than '//to_text(longest_list)//' values', bench, error)
@@ -73,7 +72,7 @@ contains
       type(bench_settings_t), intent(in) :: bench
       type(error_t), allocatable, intent(inout) :: error
 
-      call raise(error, input_error, place_of(bench, bench_group, key)//': '''//key//''' in &bench '//problem)
+      call raise(error, input_error, place_of(bench, 'bench', key)//': '''//key//''' in &bench '//problem)
    end subroutine raise_at
 
 end module polydem_check_bench
