@@ -239,6 +239,8 @@ contains
       integer(ip) :: k
 
       order = [(k, k=1_ip, list%n)]
+      ! An empty list has no arrays.
+      if (list%n < 2_ip) return
       if (all(list%id(2:list%n) > list%id(:list%n - 1_ip))) return
       order = ascending_order(int(list%id(:list%n), lp))
       do k = 2_ip, list%n
