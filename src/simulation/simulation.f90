@@ -123,8 +123,6 @@ module polydem_simulation
       !> What takes part in the steps beside all this, in the order in which it acts. While a participant acts, the list
       !> is not here, so that it may change the simulation and itself
       type(participant_item_t), allocatable :: participants(:)
-      !> Whether all ranks agree on errors of a step before it is completed
-      logical :: agrees_on_errors = .false.
       !> Forces on bodies that are no contacts
       type(body_forces_t) :: body_forces
       !> What moves the free bodies

@@ -12,7 +12,7 @@ module polydem_time_step
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_list, only: pair_list_t
-   use polydem_participants, only: begin_step, change_bodies, end_step, follow_forces, need_table
+   use polydem_participants, only: begin_step, change_bodies, end_step, follow_forces, need_all_ranks, need_table
    use polydem_predict, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
@@ -71,7 +71,7 @@ contains
          call add_other_forces(self, error)
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
-         if (self%agrees_on_errors) call self%comm%all_reduce_error(error)
+         if (need_all_ranks(self)) call self%comm%all_reduce_error(error)
          if (allocated(error)) return
          call follow_forces(self, self%dt)
          call complete_step(self, error)

@@ -11,8 +11,12 @@ module polydem_participants
    use polydem_vanishing_walls, only: vanishing_walls_t
    implicit none
    private
-   public :: choose_participants, start_participants, change_bodies, begin_step, need_table, follow_forces, end_step, &
-      serialize_participants
+   public :: choose_participants, start_participants, change_bodies, begin_step, need_table, need_all_ranks, &
+      follow_forces, end_step, serialize_participants
+
+   !> The stop at contacts without direction: a rank that finds one stops all of them
+   type, extends(participant_t) :: agreement_t
+   end type agreement_t
 
 contains
 
@@ -21,7 +25,6 @@ contains
       !> The simulation with walls, cell and sources; `participants` is set
       type(simulation_t), intent(inout) :: self
       type(participant_item_t), allocatable :: list(:)
-      integer :: k
 
       allocate (list(0))
       if (self%walls%named%has_gates()) call add(vanishing_walls_t())
@@ -30,8 +33,7 @@ contains
          call add(moving_cell_t(needs_all_ranks=allocated(self%bodies%cell%load)))
       if (allocated(self%walls%loads)) call add(loaded_walls_t(needs_all_ranks=.true.))
       if (self%settings%output%series_interval > 0.0_wp) call add(recorded_walls_t())
-      self%agrees_on_errors = self%settings%overlap%degenerate == 'stop' .or. &
-                              any([(list(k)%participant%needs_all_ranks, k=1, size(list))])
+      if (self%settings%overlap%degenerate == 'stop') call add(agreement_t(needs_all_ranks=.true.))
       call move_alloc(list, self%participants)
 
    contains
@@ -105,6 +107,17 @@ contains
          need_table = need_table .or. self%participants(k)%participant%needs_table(self)
       end do
    end function need_table
+
+   !> Whether all ranks must agree on errors before the participants act on the forces
+   pure logical function need_all_ranks(self)
+      type(simulation_t), intent(in) :: self
+      integer :: k
+
+      need_all_ranks = .false.
+      do k = 1, size(self%participants)
+         need_all_ranks = need_all_ranks .or. self%participants(k)%participant%needs_all_ranks
+      end do
+   end function need_all_ranks
 
    !> Act on the forces of a step. Collective.
    subroutine follow_forces(self, dt)

@@ -79,6 +79,7 @@ class Model:
 MODELS = (
     Model("nothing", ()),
     Model("conservative law", ("forces.law=conservative",)),
+    Model("polar law", ("forces.law=polar",)),
     Model("damping by the rate", ("forces.damping=rate", "forces.damping_from_touch=.false.")),
     Model("damping from touch", ("forces.damping=rate", "forces.damping_from_touch=.true."), "damping by the rate"),
     Model("damping of tilts", ("forces.damping=rate", "forces.damping_from_touch=.false.", "forces.tilt_damping=1"),
