@@ -17,7 +17,7 @@ module polydem_loop_results
    !> What one thread finds in its range of pairs, as sums and single values
    type :: range_results_t
       !> Terms of bodies beyond the range
-      type(term_list_t) :: late
+      type(term_list_t) :: deferred
       !> Number of contacts that this rank owns, and of those without direction
       integer(ip) :: n_contacts = 0_ip, n_degenerate = 0_ip
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
