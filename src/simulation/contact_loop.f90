@@ -218,7 +218,7 @@ contains
                              + count(owned(:block%n) .and. block%degenerate(:block%n) > 0.0_wp, kind=ip)
    end subroutine count_block
 
-   !> Add the contacts that this rank owns to the sums for a cell that yields.
+   !> Add the contacts that this rank owns to the sums for a stress-controlled cell.
    pure subroutine count_virial(has_halo, bodies, block, terms, virial)
       !> Whether other ranks own some of the bodies
       logical, intent(in) :: has_halo

@@ -199,7 +199,7 @@ contains
       end do
    end subroutine read_start
 
-   !> Check that the cell of the namelist is that of a result whose cell obeyed a stress.
+   !> Check that the cell of the namelist is that of a result whose cell was stress-controlled.
    subroutine check_cell_size(settings, origin, error)
       type(settings_t), intent(in) :: settings
       type(origin_t), intent(in) :: origin

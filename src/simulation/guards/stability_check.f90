@@ -135,19 +135,19 @@ contains
       !> Index of the contact that limits it; 0 if this rank does not have it
       integer(ip), intent(out) :: critical
       type(stability_table_t) :: table
-      real(wp), allocatable :: numbers(:), yielding(:)
+      real(wp), allocatable :: numbers(:), wall_mobility(:)
       real(wp) :: steps(2), least(2)
       integer(ip) :: limiting(2)
       integer :: k
 
       numbers = contact_numbers(self%bodies%n, self%loop%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
-      if (allocated(self%walls%loads)) yielding = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      if (allocated(self%walls%loads)) wall_mobility = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
       table = self%motion%integrator%stability()
       call stable_step_of_contacts(self%law, table, self%bodies, numbers, self%contacts, steps(1), limiting(1), &
-                                   yielding)
+                                   wall_mobility)
       call stable_step_of_bodies(self%law, table, self%bodies, self%contacts, self%loop%incidence, steps(2), &
-                                 limiting(2), yielding)
+                                 limiting(2), wall_mobility)
       least = steps
       call reduce_to_least(self%comm, least)
       ! Each of both is a bound.
