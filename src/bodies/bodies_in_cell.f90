@@ -89,7 +89,7 @@ contains
    !> Stretch the places of some free bodies as the cell grows in this step. Several threads may call it for different
    !> bodies.
    pure subroutine stretch_bodies(bodies, slots)
-      !> Bodies in a cell that yields, at the start of a step; `position` and `velocity` change
+      !> Bodies in a stress-controlled cell, at the start of a step; `position` and `velocity` change
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in), contiguous :: slots(:)

@@ -4,11 +4,12 @@
 !> missed as long as half the cell is longer than two bodies reach together; then at most one copy of a body can touch.
 !>
 !> In a *sheared* cell the copies above and below move along x, the upper one by `shift` with the velocity `jump`
-!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell yields. A
-!> cell at rest whose copies are displaced, at the start from a sheared result, is one with the rate 0. While rate or
-!> height change, every body keeps its velocity relative to the shear (`kick`), else a body and its copy would not.
+!> (A.W. Lees & S.F. Edwards, J. Phys. C 5 (1972) 1921). Both are closed functions of time, unless the cell is
+!> stress-controlled. A cell at rest whose copies are displaced, at the start from a sheared result, is one with the
+!> rate 0. While rate or height change, every body keeps its velocity relative to the shear (`kick`), else a body and
+!> its copy would not.
 !>
-!> A cell that *yields* has a size that obeys a stress (`polydem_cell_load`).
+!> A *stress-controlled* cell has a size that follows a stress (`polydem_cell_load`).
 module polydem_cell
    use polydem_driven, only: driven_t, ramp_t, window_t
    use polydem_kinds, only: ip, wp
@@ -17,13 +18,13 @@ module polydem_cell
    public :: cell_t, cell_load_t, new_cell, grow_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y, &
              shear_flow, into_cell, copies_within
 
-   !> What makes the size of a cell obey a stress, (x and y)
+   !> Control of the size of a cell by a stress, (x and y)
    type :: cell_load_t
-      !> Whether the cell yields along an axis
-      logical :: yields(2) = .false.
-      !> Stress that it obeys, positive in compression [N/m2]
+      !> Whether the cell is stress-controlled along an axis
+      logical :: is_controlled(2) = .false.
+      !> Prescribed stress, positive in compression [N/m2]
       real(wp) :: stress(2) = 0.0_wp
-      !> The size along each axis, and the window in which it yields; both have the same mass and damping
+      !> The size along each axis, and the window in which it is controlled; both have the same mass and damping
       type(driven_t) :: axis(2)
       !> Centre of the cell, which stays where it is [m]
       real(wp) :: centre(2) = 0.0_wp
@@ -63,7 +64,7 @@ module polydem_cell
       !> What a change of the shear within the step gives to bodies, over their height above the middle of the cell: a
       !> velocity [1/s], and the displacement that is left of that of the shear beyond the step times the new velocity
       real(wp) :: kick = 0.0_wp, lag = 0.0_wp
-      !> The stress that its size obeys; not allocated if the size is constant
+      !> The stress that controls its size; not allocated if the size is constant
       type(cell_load_t), allocatable :: load
    end type cell_t
 
@@ -101,8 +102,8 @@ contains
       call shear_cell(cell, 0.0_wp, 0.0_wp)
    end function new_cell
 
-   !> Shear the cell for a step. Nothing is done if it is not sheared. The velocity of a cell that yields is no closed
-   !> function of time; its displacement is summed by the trapezoidal rule.
+   !> Shear the cell for a step. Nothing is done if it is not sheared. The velocity of a stress-controlled cell is no
+   !> closed function of time; its displacement is summed by the trapezoidal rule.
    elemental subroutine shear_cell(cell, from, to)
       type(cell_t), intent(inout) :: cell
       !> Simulated time at the start and at the end of the step [s]
@@ -144,7 +145,7 @@ contains
       rest = length - period*anint(length/period)
    end function remainder_of
 
-   !> Change the size of a cell that yields by its motion in a step, by velocity Verlet.
+   !> Change the size of a stress-controlled cell by its motion in a step, by velocity Verlet.
    pure subroutine grow_cell(dt, cell)
       !> Time step [s]
       real(wp), intent(in) :: dt

@@ -18,14 +18,14 @@ module polydem_force_sums
    private
    public :: force_sums_t, contact_terms_t, n_terms, of_elastic, of_normal, of_tangential, sum_x, sum_y
    public :: sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of
-   public :: add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
+   public :: add_terms, add_deferred_terms, assemble_forces, total_forces, find_forces, set_force
    public :: energy_of_contact
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
    !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]
    integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10
-   !> Number of bodies in a group for late terms
+   !> Number of bodies in a group for deferred terms
    integer(ip), parameter :: group = 16_ip
 
    !> Sums of all bodies
@@ -203,8 +203,8 @@ contains
    end function term_of
 
    !> Add the terms of a block to the sums of its bodies, in the order of the block. Terms of bodies after the last slot
-   !> of this thread are appended to the late terms.
-   pure subroutine add_terms(block, terms, last, sums, late)
+   !> of this thread are appended to the deferred terms.
+   pure subroutine add_terms(block, terms, last, sums, deferred)
       !> Contacts in descending order
       type(contact_block_t), intent(in) :: block
       !> Their terms
@@ -213,18 +213,18 @@ contains
       integer(ip), intent(in) :: last
       type(force_sums_t), intent(inout) :: sums
       !> Terms of the bodies after `last`
-      type(term_list_t), intent(inout) :: late
+      type(term_list_t), intent(inout) :: deferred
       integer(ip) :: c, low
 
       low = 1_ip
       if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) > last) then
-         call reserve_terms(late%n + block%n, late)
+         call reserve_terms(deferred%n + block%n, deferred)
          do c = 1_ip, block%n
             if (max(block%first(c), block%second(c)) <= last) cycle
             call add_pairs(low, c - 1_ip, block%first, block%second, terms, last, sums%value, sums%has_terms)
             associate (i => block%first(c), j => block%second(c))
-               call add_or_keep([i, j], term_of(terms, c, .true.), last, sums, late)
-               call add_or_keep([j, i], term_of(terms, c, .false.), last, sums, late)
+               call add_or_keep([i, j], term_of(terms, c, .true.), last, sums, deferred)
+               call add_or_keep([j, i], term_of(terms, c, .false.), last, sums, deferred)
             end associate
             low = c + 1_ip
          end do
@@ -270,41 +270,41 @@ contains
       value(7:) = value(7:) + second
    end subroutine subtract
 
-   !> Add a term to the sums of a body, or append it to the late terms.
-   pure subroutine add_or_keep(slots, term, last, sums, late)
+   !> Add a term to the sums of a body, or append it to the deferred terms.
+   pure subroutine add_or_keep(slots, term, last, sums, deferred)
       !> Slots of the body and of its partner
       integer(ip), intent(in) :: slots(2)
       real(wp), intent(in) :: term(n_terms)
       integer(ip), intent(in) :: last
       type(force_sums_t), intent(inout) :: sums
-      type(term_list_t), intent(inout) :: late
+      type(term_list_t), intent(inout) :: deferred
 
       if (slots(1) > last) then
-         call append_term(slots, term, late)
+         call append_term(slots, term, deferred)
       else
          sums%value(:, slots(1)) = sums%value(:, slots(1)) + term
          sums%has_terms(slots(1)) = .true.
       end if
    end subroutine add_or_keep
 
-   !> Add late terms to the sums of a share of the bodies, in the order of the terms. Bodies with late terms lie close
-   !> together. Threads therefore take turns in groups of bodies, whose sums fill whole cache lines.
-   pure subroutine add_late_terms(late, k, n, sums)
-      !> Late terms of one thread
-      type(term_list_t), intent(in) :: late
+   !> Add deferred terms to the sums of a share of the bodies, in the order of the terms. Bodies with deferred terms lie
+   !> close together. Threads therefore take turns in groups of bodies, whose sums fill whole cache lines.
+   pure subroutine add_deferred_terms(deferred, k, n, sums)
+      !> Deferred terms of one thread
+      type(term_list_t), intent(in) :: deferred
       !> The share, from 1, and the number of shares
       integer(ip), intent(in) :: k, n
       type(force_sums_t), intent(inout) :: sums
       integer(ip) :: t
 
-      do t = 1_ip, late%n
-         associate (s => late%slots(1, t))
+      do t = 1_ip, deferred%n
+         associate (s => deferred%slots(1, t))
             if (mod(s/group, n) /= k - 1_ip) cycle
-            sums%value(:, s) = sums%value(:, s) + late%term(:, t)
+            sums%value(:, s) = sums%value(:, s) + deferred%term(:, t)
             sums%has_terms(s) = .true.
          end associate
       end do
-   end subroutine add_late_terms
+   end subroutine add_deferred_terms
 
    !> Sum the forces of a whole table of contacts, and set the forces and torques on all bodies.
    subroutine assemble_forces(gravity, contacts, bodies, sums)

@@ -214,6 +214,8 @@ contains
          clause = 'tunnelling in &guards'
       case ('guards.relaxed_depth')
          clause = 'remove_overlap in &scene'
+      case ('cell.obeys')
+         clause = 'stress_controlled in &cell'
       case ('checkpoint.elapsed')
          clause = 'wall_interval in &checkpoint'
       case default

@@ -197,8 +197,8 @@ contains
       character(len=:), allocatable :: text
 
       text = ''
-      if (group == 'cell' .and. decider == 'periodic' .and. key == 'obeys') text = '; a wall obeys a stress with a '// &
-         'group &load'
+      if (group == 'cell' .and. decider == 'periodic' .and. key == 'stress_controlled') &
+         text = '; a stress controls a wall with a group &load'
    end function remedy
 
    !> Check that each name in an entry is that of a group which the entry refers to. An empty name refers to none.

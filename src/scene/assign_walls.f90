@@ -131,7 +131,7 @@ contains
       end do
    end subroutine assign_motions
 
-   !> Find the bodies of a wall that yields to a load.
+   !> Find the bodies of a load-controlled wall.
    subroutine find_loaded(settings, name, named, bodies, slots, is_moved, error)
       type(settings_t), intent(in) :: settings
       character(len=*), intent(in) :: name

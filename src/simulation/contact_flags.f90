@@ -61,7 +61,7 @@ contains
    end subroutine new_flag_limits
 
    !> Test the contacts of a block, and store their directions.
-   subroutine test_block(limits, bodies, block, history, suspect, any_suspect, passing_pair)
+   subroutine test_block(limits, bodies, block, history, flagged, any_flagged, passing_pair)
       !> Limits beyond which a contact is flagged
       type(flag_limits_t), intent(in) :: limits
       !> Bodies with the positions of this step
@@ -71,9 +71,9 @@ contains
       !> Contact history; the direction is read and set
       type(contact_history_t), intent(inout) :: history
       !> Whether each contact is deep, degenerate or stiff; set if any is
-      logical, intent(inout) :: suspect(block_size)
+      logical, intent(inout) :: flagged(block_size)
       !> Whether any may be
-      logical, intent(out) :: any_suspect
+      logical, intent(out) :: any_flagged
       !> Lowest index in the pair list of a contact whose bodies pass through each other; changes if there is one
       integer(ip), intent(inout) :: passing_pair
       real(wp) :: before(block_size), now(block_size), deepest
@@ -84,8 +84,8 @@ contains
          deepest = max(deepest, max(block%degenerate(c), block%depth(c) - limits%shallow, &
                                     block%length(c)*block%inverse_length(c)*block%mobility(c) - limits%soft))
       end do
-      any_suspect = deepest > 0.0_wp
-      if (any_suspect) call find_suspects(limits, bodies, block, suspect)
+      any_flagged = deepest > 0.0_wp
+      if (any_flagged) call find_flagged(limits, bodies, block, flagged)
       if (limits%column == 0) return
       do c = 1_ip, block%n
          now(c) = packed_direction(block%direction(c, 1), block%direction(c, 2))
@@ -96,29 +96,29 @@ contains
             stored(block%pair(c)) = now(c)
          end do
       end associate
-      if (.not. any_suspect) return
+      if (.not. any_flagged) return
       do c = 1_ip, block%n
-         if (.not. suspect(c)) cycle
+         if (.not. flagged(c)) cycle
          if (passes(bodies, block, c, is_reversed(before(c), now(c)))) passing_pair = block%pair(c)
       end do
    end subroutine test_block
 
    !> Find the contacts that are deep, degenerate or stiff.
-   pure subroutine find_suspects(limits, bodies, block, suspect)
+   pure subroutine find_flagged(limits, bodies, block, flagged)
       !> Limits beyond which a contact is flagged
       type(flag_limits_t), intent(in) :: limits
       type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(in) :: block
-      logical, intent(inout) :: suspect(block_size)
+      logical, intent(inout) :: flagged(block_size)
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         suspect(c) = block%degenerate(c) > 0.0_wp &
+         flagged(c) = block%degenerate(c) > 0.0_wp &
             .or. block%length(c)*block%inverse_length(c)*block%mobility(c) > limits%soft
-         if (suspect(c) .or. limits%least_depth >= huge(1.0_wp)) cycle
-         suspect(c) = block%depth(c) > limits%least_depth*thinner_of(bodies, block, c)
+         if (flagged(c) .or. limits%least_depth >= huge(1.0_wp)) cycle
+         flagged(c) = block%depth(c) > limits%least_depth*thinner_of(bodies, block, c)
       end do
-   end subroutine find_suspects
+   end subroutine find_flagged
 
    !> Thickness of the thinner of the two pieces of a contact [m]
    pure real(wp) function thinner_of(bodies, block, c)

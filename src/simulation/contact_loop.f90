@@ -15,7 +15,7 @@ module polydem_contact_loop
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t
    use polydem_fill_block, only: fill_block
-   use polydem_force_sums, only: add_late_terms, add_terms, begin_sums, clear_sums, contact_terms_t, terms_of_block
+   use polydem_force_sums, only: add_deferred_terms, add_terms, begin_sums, clear_sums, contact_terms_t, terms_of_block
    use polydem_motion_check, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: find_owned_pairs
@@ -71,7 +71,7 @@ contains
       !$omp do schedule(static, 1)
       do k = 1_ip, n
          do r = n - 1_ip, 1_ip, -1_ip
-            call add_late_terms(self%loop%ranges(r)%late, k, n, self%loop%force_sums)
+            call add_deferred_terms(self%loop%ranges(r)%deferred, k, n, self%loop%force_sums)
          end do
          if (k == n) call join_walls(self%loop%walls_of(:n), self%loop%walls)
       end do
@@ -147,7 +147,7 @@ contains
             call clear_sums(low, high, self%loop%force_sums)
             high = min(high, low - 1_ip)
          end if
-         call add_terms(block, terms, last(2), self%loop%force_sums, self%loop%ranges(r)%late)
+         call add_terms(block, terms, last(2), self%loop%force_sums, self%loop%ranges(r)%deferred)
          call count_block(self%domain%has_halo(), self%bodies, block, self%loop%ranges(r))
          if (allocated(self%bodies%cell%load)) &
             call count_virial(self%domain%has_halo(), self%bodies, block, terms, self%loop%ranges(r)%virial)
@@ -171,7 +171,7 @@ contains
       loop%walls_of(r)%n = 0_ip
       loop%walls_of(r)%border%n = 0_ip
       associate (results => loop%ranges(r))
-         results%late%n = 0_ip
+         results%deferred%n = 0_ip
          results%n_contacts = 0_ip
          results%n_degenerate = 0_ip
          results%passing_pair = 0_ip
@@ -189,13 +189,13 @@ contains
       !> Contact history; the direction is read and set
       type(contact_history_t), intent(inout) :: history
       type(loop_results_t), intent(inout) :: loop
-      logical :: suspect(block_size), some
+      logical :: flagged(block_size), some
 
       if (loop%has_table) call append_rows(block, loop%all_of(r), with_forces=.true.)
       call append_walls(bodies%fixed, block, terms, loop%walls_of(r))
       if (bodies%cell%is_sheared) call append_border(bodies, block, terms, loop%walls_of(r)%border)
-      call test_block(loop%flag_limits, bodies, block, history, suspect, some, loop%ranges(r)%passing_pair)
-      if (some) call append_rows(block, loop%flagged_of(r), with_forces=.true., chosen=suspect)
+      call test_block(loop%flag_limits, bodies, block, history, flagged, some, loop%ranges(r)%passing_pair)
+      if (some) call append_rows(block, loop%flagged_of(r), with_forces=.true., chosen=flagged)
    end subroutine keep_contacts
 
    !> Count the contacts that this rank owns, and those without direction.
@@ -218,7 +218,7 @@ contains
                              + count(owned(:block%n) .and. block%degenerate(:block%n) > 0.0_wp, kind=ip)
    end subroutine count_block
 
-   !> Add the contacts that this rank owns to the sums for a cell that yields.
+   !> Add the contacts that this rank owns to the sums for a stress-controlled cell.
    pure subroutine count_virial(has_halo, bodies, block, terms, virial)
       !> Whether other ranks own some of the bodies
       logical, intent(in) :: has_halo

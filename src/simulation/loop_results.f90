@@ -17,12 +17,12 @@ module polydem_loop_results
    !> What one thread finds in its range of pairs, as sums and single values
    type :: range_results_t
       !> Terms of bodies beyond the range
-      type(term_list_t) :: late
+      type(term_list_t) :: deferred
       !> Number of contacts that this rank owns, and of those without direction
       integer(ip) :: n_contacts = 0_ip, n_degenerate = 0_ip
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
       integer(ip) :: passing_pair = 0_ip
-      !> Sums for a cell that yields, as in `polydem_cell_load`
+      !> Sums for a stress-controlled cell, as in `polydem_cell_load`
       integer(lp) :: virial(2, 3) = 0_lp
    end type range_results_t
 
@@ -56,7 +56,7 @@ module polydem_loop_results
       type(contacts_t) :: flagged
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
       integer(ip) :: passing_pair = 0_ip
-      !> Sums of the contacts of this rank for a cell that yields, as in `polydem_cell_load`
+      !> Sums of the contacts of this rank for a stress-controlled cell, as in `polydem_cell_load`
       integer(lp) :: virial(2, 3) = 0_lp
       !> Contacts of each body, if the table of contacts is kept
       type(incidence_t) :: incidence

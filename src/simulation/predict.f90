@@ -151,9 +151,9 @@ contains
       end do
    end subroutine predict_block
 
-   !> Return those of up to `block_size` bodies to the cell that have left it, and stretch their places with a cell that
-   !> yields, and let them follow a shear that changes. What this changes of their momentum and kinetic energy is the
-   !> work of the cell, and counts as that of a wall.
+   !> Return those of up to `block_size` bodies to the cell that have left it, and stretch their places with a
+   !> stress-controlled cell, and let them follow a shear that changes. What this changes of their momentum and kinetic
+   !> energy is the work of the cell, and counts as that of a wall.
    subroutine return_to_cell(dt, slots, bodies, balance)
       !> Time step [s]
       real(wp), intent(in) :: dt

@@ -177,7 +177,7 @@ contains
    end function present_gravity
 
    !> Whether a step leaves nothing out for bodies that nothing touches: forces act on all bodies, or the border of a
-   !> sheared cell, or a cell that yields; or bodies have several pieces, of which pairs are made
+   !> sheared cell, or a stress-controlled cell; or bodies have several pieces, of which pairs are made
    pure logical function acts_on_all(self)
       type(simulation_t), intent(in) :: self
 

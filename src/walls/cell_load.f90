@@ -1,6 +1,6 @@
-!> A periodic cell whose size obeys a stress.
+!> A stress-controlled periodic cell.
 !>
-!> Each axis along which the cell yields has one degree of freedom, the size L. With the stress s of the contacts
+!> Each controlled axis has one degree of freedom, the size L. With the stress s of the contacts
 !> (Love-Weber, without the motion of the bodies), the prescribed stress p, mass M and damping c of the cell
 !>
 !>     M d2L/dt2 = (s - p) L' - c dL/dt,
@@ -22,14 +22,14 @@ module polydem_cell_load
    use polydem_serializer, only: serializer_t
    implicit none
    private
-   public :: set_cell_mass, add_virial, yield_cell, serialize_cell
+   public :: set_cell_mass, add_virial, accelerate_cell, serialize_cell
 
    !> Logarithm to base 2 of E d2 over the unit
    integer, parameter :: unit_bits = 44
 
 contains
 
-   !> Set mass, damping and unit of a cell that yields.
+   !> Set mass, damping and unit of a stress-controlled cell.
    pure subroutine set_cell_mass(usual, stiffness, diameter, load)
       !> Mass of a cell without a mass of its own [kg/m]
       real(wp), intent(in) :: usual
@@ -80,7 +80,7 @@ contains
    end function rounded
 
    !> Find the velocity of the size from the contacts. The size does not change. Collective.
-   subroutine yield_cell(comm, dt, time, virial, cell)
+   subroutine accelerate_cell(comm, dt, time, virial, cell)
       class(communicator_t), intent(inout) :: comm
       !> Time step; 0 at the start of the run [s]
       real(wp), intent(in) :: dt
@@ -99,7 +99,7 @@ contains
       associate (load => cell%load)
          total = load%unit*real(reshape(sums, [2, 3]), wp)
          do axis = 1, 2
-            if (.not. load%yields(axis)) cycle
+            if (.not. load%is_controlled(axis)) cycle
             ! In compression the forces are against the distances.
             force = -sum(total(axis, :))/cell%size(axis) - present_stress(load, axis, time)*cell%size(3 - axis)
             call load%axis(axis)%correct(dt, time, force)
@@ -108,7 +108,7 @@ contains
          if (dt > 0.0_wp) load%power_sum = load%power_sum + load%power
          if (.not. dt > 0.0_wp) load%power_sum = 0.5_wp*load%power
       end associate
-   end subroutine yield_cell
+   end subroutine accelerate_cell
 
    !> Prescribed stress along an axis at a time [N/m2]
    pure real(wp) function present_stress(load, axis, time) result(stress)
@@ -121,7 +121,7 @@ contains
       stress = load%stress(axis)*ramp%factor
    end function present_stress
 
-   !> Serialize the motion of a cell that yields.
+   !> Serialize the motion of a stress-controlled cell.
    subroutine serialize_cell(cell, serializer)
       !> A cell with a load
       type(cell_t), intent(inout) :: cell

@@ -1,4 +1,4 @@
-!> Loads: a force, a stress or a torque on a named wall, which yields along one direction by Newton's law.
+!> Loads: a force, a stress or a torque on a named wall, which moves along one direction by Newton's law.
 !>
 !> A load has one degree of freedom (`polydem_driven`), the displacement of the wall along x or y, or its angle about a
 !> pivot. The displacement comes on top of the motions of the wall.
@@ -188,7 +188,7 @@ contains
       end do
    end subroutine find_contact_forces
 
-   !> Force [N/m] or torque [N] of a load and of gravity at a time; 0 while the wall does not yield
+   !> Force [N/m] or torque [N] of a load and of gravity at a time; 0 while the wall is not controlled
    pure real(wp) function applied_force(load, walls, bodies, time, gravity) result(force)
       type(wall_load_t), intent(in) :: load
       type(named_walls_t), intent(in) :: walls
@@ -307,8 +307,8 @@ contains
       end do
    end subroutine serialize_loads
 
-   !> Mobility of the bodies of walls that yield, for the stable step: each contact of a wall has its share of the mass,
-   !> (slot) [m/kg]
+   !> Mobility of the bodies of load-controlled walls, for the stable step: each contact of a wall has its share of the
+   !> mass, (slot) [m/kg]
    pure function wall_mobilities(loads, walls, bodies) result(mobility)
       !> All loads
       type(wall_load_t), intent(in) :: loads(:)

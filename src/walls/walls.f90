@@ -27,7 +27,7 @@ module polydem_walls
       type(wall_record_t) :: record
    contains
       procedure :: predict
-      procedure :: yield
+      procedure :: accelerate
       procedure :: move
       procedure :: energies
       procedure :: accumulate
@@ -36,7 +36,7 @@ module polydem_walls
 
 contains
 
-   !> Move the walls to the end of a step. The velocities of those that yield to loads are predicted.
+   !> Move the walls to the end of a step. The velocities of load-controlled ones are predicted.
    subroutine predict(self, dt, time, bodies)
       class(walls_t), intent(inout) :: self
       !> Time step [s]
@@ -50,8 +50,8 @@ contains
       call self%move(time, bodies)
    end subroutine predict
 
-   !> Find the velocities of the walls that yield to loads from the contacts. Their places do not change. Collective.
-   subroutine yield(self, comm, dt, time, gravity, bodies, terms)
+   !> Find the velocities of the load-controlled walls from the contacts. Their places do not change. Collective.
+   subroutine accelerate(self, comm, dt, time, gravity, bodies, terms)
       !> Walls with loads
       class(walls_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
@@ -68,7 +68,7 @@ contains
 
       call correct_loads(self%loads, comm, dt, time, gravity, self%named, bodies, terms)
       call self%move(time, bodies)
-   end subroutine yield
+   end subroutine accelerate
 
    !> Move the bodies of the walls to their poses at a given time, and displace them by loads. Those that have left a
    !> periodic cell return to it.

@@ -373,7 +373,7 @@ def elsewhere(entry):
     if entry.name.startswith((f"source.{NAME}.", f"sink.{NAME}.")):
         return "tests/ranks: scene flow"
     if entry.condition and entry.condition[0] == "cell.obeys":
-        return "tests/ranks: scene yielding"
+        return "tests/ranks: scene controlled"
     return ELSEWHERE.get(entry.name, "")
 
 

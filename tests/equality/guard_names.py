@@ -101,7 +101,7 @@ BASE = Names()
 PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "scene.solid_fraction",
                          "integrate.fraction": "integrate.safety_factor", "guards.passing": "guards.tunnelling",
                          "guards.relaxed_depth": "scene.remove_overlap",
-                         "checkpoint.elapsed": "checkpoint.wall_interval",
+                         "checkpoint.elapsed": "checkpoint.wall_interval", "cell.obeys": "cell.stress_controlled",
                          # Two entries became one of two values; `words` has those of the cases
                          **{f"scene.{key}_{end}": f"scene.{key}" for key in ("corners", "long_axis")
                             for end in ("min", "max")},

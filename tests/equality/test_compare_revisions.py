@@ -1,5 +1,6 @@
 """Test of the guard: the smallest change of a result is found, names are translated, no entry is forgotten."""
 
+import re
 import sys
 import tempfile
 import unittest
@@ -22,6 +23,8 @@ def in_words_of_base(manual):
         if new and new.count(".") == 1:
             (old_group, old_key), (group, key) = old.split("."), new.split(".")
             manual = manual.replace(f"| &{group} | `{key}` |", f"| &{old_group} | `{old_key}` |")
+            if group == old_group:
+                manual = re.sub(rf"^(\| &{group} \|.*\| ){key} = ", rf"\g<1>{old_key} = ", manual, flags=re.MULTILINE)
     for old, new in PRESENT.groups.items():
         manual = manual.replace(f"| &{new} |", f"| &{old} |")
     for old, new in PRESENT.words.items():

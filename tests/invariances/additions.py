@@ -31,7 +31,7 @@ class Additions:
     def a_wall(self, shifts=False):
         """A wall that may get a motion or a load: the floor before others, and one that has another motion if need be.
 
-        One that yields along one axis may be shifted along the other.
+        One that is stress-controlled along one axis may be shifted along the other.
         """
         taken = {group.get("wall") for group in self.scene.groups.values()}
         names = [name for name in self.floors if name not in taken]

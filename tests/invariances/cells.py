@@ -157,14 +157,14 @@ def is_long(scene, body):
 
 
 def scale_cell(scene, numbers):
-    """Mass and damping of a cell that obeys a stress; false if one mass does not do for both axes."""
-    obeys = scene.get("cell", "obeys", "none")
-    if obeys == "none":
+    """Mass and damping of a stress-controlled cell; false if one mass does not do for both axes."""
+    controlled = scene.get("cell", "stress_controlled", "none")
+    if controlled == "none":
         return True
     factors = {"x": numbers[1]/numbers[0], "y": numbers[0]/numbers[1]}
-    if obeys == "xy" and numbers[0] != numbers[1]:
+    if controlled == "xy" and numbers[0] != numbers[1]:
         return False
-    factor = factors[obeys[0]]
+    factor = factors[controlled[0]]
     scene.put("cell", mass=scene.get("cell", "mass")*factor,
               damping_ratio=scene.get("cell", "damping_ratio")*np.sqrt(factor))
     return True

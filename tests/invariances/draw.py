@@ -95,7 +95,7 @@ class Drawing(Additions):
             self.new_floor("left", 1)
             return
         for k in (0, 1) if axis < 0 else (axis,):
-            # A cell that obeys a stress shrinks.
+            # A stress-controlled cell shrinks.
             self.size[k] = max(self.size[k], (5.6 if self.container == "stress_controlled" else 4.8)*self.radius)
         if self.container == "periodic_xy" and DRIVEN & self.chosen:
             self.size[1] += 1.2*self.radius
@@ -140,12 +140,13 @@ class Drawing(Additions):
             scene.tags.add("shear_ramp")
 
     def draw_stress_controlled(self):
-        scene, obeys = self.scene, self.dice.choice(("x", "y", "xy"))
+        scene, controlled = self.scene, self.dice.choice(("x", "y", "xy"))
         if self.dice.random() < 0.3:
-            obeys = "y"
+            controlled = "y"
             scene.put("cell", shear_rate=self.uniform(0.5, 3)/self.size[1])
             scene.tags.add("sheared")
-        scene.put("cell", obeys=obeys, stress=[self.uniform(5e2, 5e3)*(axis in obeys) for axis in "xy"],
+        scene.put("cell", stress_controlled=controlled,
+                  stress=[self.uniform(5e2, 5e3)*(axis in controlled) for axis in "xy"],
                   mass=self.uniform(0.3, 2), damping_ratio=self.uniform(0.1, 0.5))
         if self.dice.random() < 0.3:
             scene.put("cell", stress_ramp=80*scene.dt)

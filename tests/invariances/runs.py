@@ -126,7 +126,7 @@ def play(command, parts, folder):
                     wall = groups[name]
                     groups[name] = {"outline": "result",
                                     **{key: wall[key] for key in wall if key not in ("outline", "bodies")}}
-            if "obeys" in groups.get("cell", {}):
+            if "stress_controlled" in groups.get("cell", {}):
                 groups["cell"].update(last_cell(folder/before))
         groups.setdefault("output", {}).update(folder=target)
         name = f"{number}_{NAMELIST}"

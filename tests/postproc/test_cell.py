@@ -131,17 +131,17 @@ def test_copies_across_a_sheared_border_have_the_velocity_of_their_copy(tmp_path
     assert low == -high and low == pytest.approx(-0.216, rel=0.01)
 
 
-OBEYS = "obeys = 'y' stress = 0, 1e3 mass = 0.5 damping_ratio = 0.1"
+CONTROLLED = "stress_controlled = 'y' stress = 0, 1e3 mass = 0.5 damping_ratio = 0.1"
 
 
-@pytest.mark.parametrize("more", ["", "shear_ramp = 4e-3", OBEYS])
+@pytest.mark.parametrize("more", ["", "shear_ramp = 4e-3", CONTROLLED])
 def test_the_velocity_of_the_copy_above_is_the_rate_of_its_displacement(tmp_path, more):
     run = sheared(tmp_path, more, 8e-3)
     frames = list(run)
     times, shift, jump = (np.array([getattr(frame, name) for frame in frames]) for name in ("time", "shift", "jump"))
     assert np.diff(shift) / np.diff(times) == pytest.approx(0.5 * (jump[1:] + jump[:-1]), abs=2e-3)
     assert jump[-1] == pytest.approx(4 * frames[-1].cell_size[1], rel=1e-12)
-    assert ("obeys" in more) == (frames[-1].cell_size[1] < 0.0999)
+    assert ("stress_controlled" in more) == (frames[-1].cell_size[1] < 0.0999)
     assert all(np.array_equal(frame.copy_velocities, np.outer(np.rint(frame.shifts[:, 1] / frame.cell_size[1]),
                                                               (frame.jump, 0.0))) for frame in frames)
 
@@ -155,7 +155,7 @@ def lines_of(artist):
 
 def test_a_cell_has_its_outline_at_the_time_of_the_frame_and_nothing_beyond(tmp_path):
     """Finds whole copies around a cell that has shrunk, and copies of a film that stay where they were at first."""
-    run = sheared(tmp_path, OBEYS, 8e-3)
+    run = sheared(tmp_path, CONTROLLED, 8e-3)
     numbers = [0, len(run) - 1]
     look = settle(run, numbers, Look(colour="velocity_x", show=("boxes",)))
     axis = Figure().add_subplot()
@@ -278,10 +278,10 @@ def test_fields_cover_the_cell_and_know_its_copies(trajectory):
     assert fields.contact_stress.sum(axis=(0, 1)) * fields.cell == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-def test_a_cell_that_obeys_a_stress_has_another_size_in_each_frame(tmp_path):
+def test_a_stress_controlled_cell_has_another_size_in_each_frame(tmp_path):
     """Finds frames with the size of the start: arms across the border would be as long as the cell."""
-    scene = SCENE.replace("size = 0.06, 0.05", "size = 0.06, 0.05 obeys = 'xy' stress = 2e3, 1e3 mass = 0.05"
-                          " damping_ratio = 1")
+    scene = SCENE.replace("size = 0.06, 0.05", "size = 0.06, 0.05 stress_controlled = 'xy' stress = 2e3, 1e3"
+                          " mass = 0.05 damping_ratio = 1")
     scene = scene.replace("contacts =", "series_interval = 1e-3 contacts =").format(folder=tmp_path / "result")
     (tmp_path / "pressed.nml").write_text(scene, encoding="utf-8")
     subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", tmp_path / "pressed.nml"], check=True, stdout=subprocess.PIPE)

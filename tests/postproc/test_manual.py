@@ -54,7 +54,7 @@ def test_the_search_finds_words_of_names(site):
     plain = {entry["location"]: re.sub(r"<[^>]*>|[^\w\s-]", " ", entry["text"]).lower() for entry in index["docs"]}
     found = {location for location, text in plain.items()
              if {"inertial", "number"} <= set(re.split(index["config"]["separator"], text))}
-    assert {"inputs/walls.html#series", "inputs/glossary.html", "inputs/cells.html#a-cell-that-obeys-a-stress",
+    assert {"inputs/walls.html#series", "inputs/glossary.html", "inputs/cells.html#a-stress-controlled-cell",
             "postproc/analysis.html"} <= found
 
 

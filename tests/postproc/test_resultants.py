@@ -39,9 +39,10 @@ SCENES = {
     "pieces": BOX.format(shape=CROSSES, forces="cohesion = 300"),
     "exact friction": BOX.format(shape=REGULAR, forces="friction = 'exact'"),
     "without friction and damping": BOX.format(shape=REGULAR, forces="friction = 'none' damping = 'none'"),
-    "sheared cell": CELL.format(cell="obeys = 'y' stress = 0, 3e3", forces="rolling_friction = 0.2"),
-    "sheared cell, area law": CELL.format(cell="obeys = 'y' stress = 0, 3e3", forces="law = 'area'"),
-    "cell": CELL.format(cell="obeys = 'xy' stress = 3e3, 3e3", forces="cohesion = 200").replace("shear_rate = 5", ""),
+    "sheared cell": CELL.format(cell="stress_controlled = 'y' stress = 0, 3e3", forces="rolling_friction = 0.2"),
+    "sheared cell, area law": CELL.format(cell="stress_controlled = 'y' stress = 0, 3e3", forces="law = 'area'"),
+    "cell": CELL.format(cell="stress_controlled = 'xy' stress = 3e3, 3e3", forces="cohesion = 200")
+    .replace("shear_rate = 5", ""),
 }
 
 

@@ -22,10 +22,10 @@ CHANNEL = """\
 """
 CELL = "&cell periodic = 'xy' low = -0.05, -0.05 size = 0.1, 0.1 /\n"
 SHEARED = CELL.replace("/", "shear_rate = 60 shear_ramp = 5e-3 profile = .true. /")
-YIELDING = CELL.replace("/", "obeys = 'xy' stress = 2e4, 3e4 mass = 0.1 damping_ratio = 0.5 /")
+CONTROLLED = CELL.replace("/", "stress_controlled = 'xy' stress = 2e4, 3e4 mass = 0.1 damping_ratio = 0.5 /")
 
 #: Cells without walls
-WITHOUT_WALLS = (CELL, SHEARED, YIELDING)
+WITHOUT_WALLS = (CELL, SHEARED, CONTROLLED)
 
 #: Grains in the lower and in the upper half
 GRAINS = """\
@@ -59,7 +59,7 @@ CAPABILITIES = {
     "channel": Capability(container=CHANNEL),
     "cell": Capability(container=CELL),
     "shear": Capability(container=SHEARED),
-    "yielding": Capability(container=YIELDING),
+    "controlled": Capability(container=CONTROLLED),
     "materials": Capability(
         groups="&material name = 'hard' stiffness = 8e5 restitution = 0.9 friction_coefficient = 0.1 /\n"
                "&material name = 'soft' density = 900 restitution = 0.3 friction_coefficient = 0.8 /\n"
@@ -107,8 +107,8 @@ CAPABILITIES = {
 #: Pairs that the program refuses, and a part of its message
 REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
-    ("exact_friction", "yielding"): "does not know how the cell grows",
-    ("traffic", "yielding"): "do not move with the cell",
+    ("exact_friction", "controlled"): "does not know how the cell grows",
+    ("traffic", "controlled"): "do not move with the cell",
     ("exact_friction", "local_damping"): "whose forces depend on the motion without it",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",
@@ -117,7 +117,7 @@ REFUSED = {
 
 #: Choices of the table of entries that no capability has: what they do beside others is what another one does
 LEFT_OUT = {
-    "cell.periodic=y": "x", "cell.obeys=x": "xy", "cell.obeys=y": "xy",
+    "cell.periodic=y": "x", "cell.stress_controlled=x": "xy", "cell.stress_controlled=y": "xy",
     "motion.kind=rotation": "oscillation", "motion.kind=translation": "oscillation", "motion.kind=table": "oscillation",
     "load.direction=x": "y", "load.direction=angle": "y",
     "grains.shape=regular": "random", "grains.shape=rectangle": "random", "grains.shape=outline": "cross",
@@ -169,7 +169,7 @@ def text(names):
     container = joined("container") or BOX
     gravity = "0, 0" if container in WITHOUT_WALLS else "0, -40"
     groups = "".join(part.groups for part in chosen)
-    if container == YIELDING:
+    if container == CONTROLLED:
         # Such a cell has no gravity, in no stage
         groups = groups.replace(" gravity = 20, -20", "")
     duration = "" if "stages" in names else f"duration = {min(part.duration for part in chosen)}"

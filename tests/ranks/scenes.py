@@ -91,10 +91,10 @@ SCENES = {
 &forces gravity = 0, 0 stiffness = 1e6 /
 &integrate safety_factor = 0.1 duration = 0.02 /
 """,
-    # A cell that yields to a stress across the shear: it shrinks to less than a half.
-    "yielding": """\
+    # A cell whose height is stress-controlled across the shear: it shrinks to less than a half.
+    "controlled": """\
 &cell periodic = 'xy' low = -0.05, -0.03 size = 0.1, 0.1 shear_rate = 60 profile = .true.
-   obeys = 'y' stress = 0, 2e4 mass = 0.02 damping_ratio = 0.5 /
+   stress_controlled = 'y' stress = 0, 2e4 mass = 0.02 damping_ratio = 0.5 /
 &grains name = 'sample' region = 'box' low = -0.05, -0.03 high = 0.05, 0.07 number = 70 arrangement = 'spread'
    speed = 1 spin = 50 momentum = 'zero' /
 &forces gravity = 0, 0 stiffness = 1e6 /
@@ -148,7 +148,7 @@ SCENES = {
 &stage name = 'rest' until = 'unbalanced' below = 4 longest = 1 gravity = 20, -20 /
 &stage name = 'float' gravity = 0, 0 duration = 0.004 /
 """,
-    # Walls that yield to a stress, a force and a torque, a belt, a gate, and the record of all of them.
+    # Walls under a stress, a force and a torque, a belt, a gate, and the record of all of them.
     "walls": """\
 &wall name = 'left' outline = 'rectangle' low = -0.12, -0.1 high = -0.1, 0.1 /
 &wall name = 'right' outline = 'rectangle' low = 0.1, -0.1 high = 0.12, 0.1 /

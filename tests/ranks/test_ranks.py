@@ -30,11 +30,11 @@ RANKS = (1, 2, 3, 4, 7)
 THREADS = (1, 2)
 #: How often bodies are handed out anew at least; grains in a stack hardly move
 LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "pieces": 100, "materials": 100,
-                     "cell": 100, "shear": 100, "yielding": 100, "border": 50, "carried": 100, "chute": 100,
+                     "cell": 100, "shear": 100, "controlled": 100, "border": 50, "carried": 100, "chute": 100,
                      "stages": 30, "walls": 100, "flow": 50, "stack": 1}
 #: Numbers of ranks that are tried unless all are
 QUICK_RANKS = {"drum": (2, 4), "gas": (1, 3), "hopper": (2, 3), "bed": (4, 2), "parts": (1, 2),
-               "pieces": (2, 7), "materials": (3, 4), "cell": (3, 1), "shear": (2, 3), "yielding": (3, 2),
+               "pieces": (2, 7), "materials": (3, 4), "cell": (3, 1), "shear": (2, 3), "controlled": (3, 2),
                "border": (2, 3), "carried": (3, 2), "chute": (2, 3), "stages": (1, 2), "walls": (3, 4), "flow": (2, 3),
                "stack": (2, 7)}
 #: What is tried unless all is: every scene on two numbers of ranks, every finder somewhere, few ranks with two threads
@@ -42,7 +42,7 @@ QUICK = [(scene, ranks, 1 + (ranks + k) % 2 if ranks < 4 else 1, FINDERS[(2 * k 
          for k, scene in enumerate(SCENES) for n, ranks in enumerate(QUICK_RANKS[scene])]
 #: Runs that go on with other ranks, twice; some are tried unless all are
 RESTARTS = (("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1)), ("chute", (1, 3, None)),
-            ("shear", (2, None, 3)), ("yielding", (None, 2, 3)), ("walls", (2, 3, None)), ("flow", (3, None, 2)))
+            ("shear", (2, None, 3)), ("controlled", (None, 2, 3)), ("walls", (2, 3, None)), ("flow", (3, None, 2)))
 #: Scenes that are long enough for two interruptions
 OF_MANY_STEPS = ("shear", "flow")
 

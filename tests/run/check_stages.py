@@ -148,11 +148,12 @@ def a_frame_is_a_start_without_history(case):
     assert "no_frame.nml:1: 'start_from' in &scene: film has no frame 999" in message, message
 
 
-def a_cell_that_obeyed_a_stress_keeps_its_size(case):
+def a_stress_controlled_cell_keeps_its_size(case):
     """Finds a start with bodies that a cell of another size folds back over each other."""
     cell = "&cell periodic = 'xy' size = {size} {entries} /\n"
     rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 0.015625", scheme="")
-    case.run(cell.format(size="0.1, 0.1", entries="obeys = 'xy' stress = 2e4, 1e4 mass = 0.02") + GAS + rest, "pressed")
+    entries = "stress_controlled = 'xy' stress = 2e4, 1e4 mass = 0.02"
+    case.run(cell.format(size="0.1, 0.1", entries=entries) + GAS + rest, "pressed")
     for folder, origin in (("smaller", "pressed"), ("as_frame", "pressed:9")):
         scene = f"&scene name = 'result' start_from = '{origin}' /\n"
         message = case.run(cell.format(size="0.1, 0.1", entries="") + scene + rest, "as_before", code=BAD_INPUT)
@@ -430,7 +431,7 @@ def faults_are_named(case):
 
 
 TESTS = (stages_are_runs_that_start_from_each_other, a_frame_is_a_start_without_history,
-         a_cell_that_obeyed_a_stress_keeps_its_size, a_sheared_cell_goes_on_where_it_was,
+         a_stress_controlled_cell_keeps_its_size, a_sheared_cell_goes_on_where_it_was,
          bodies_beyond_the_border_start_where_their_copies_are, pieces_keep_their_history,
          a_stage_that_ends_at_once_is_told, walls_do_not_jump_when_motions_change, walls_that_have_vanished_stay_away,
          conditions_end_stages_alike_everywhere, a_run_goes_on_in_its_stage, more_stages_make_a_finished_run_longer,

@@ -22,7 +22,7 @@ program faulty_finder
    !> A gas whose bodies are spread over all ranks
    character(len=*), parameter :: gas = "&scene name = 'gas' bodies = 60 solid_fraction = 0.3 speed = 1 /"// &
       '&forces gravity = 0, 0 /&integrate dt = 1e-6 duration = 1e-3 /'
-   !> Another one in a ring that yields to a load
+   !> Another one in a load-controlled ring
    character(len=*), parameter :: ring = "&wall name = 'ring' outline = 'ring' radius = 0.1 segments = 20 "// &
       "thickness = 0.01 /&grains name = 'g' region = 'inside' wall = 'ring' number = 60 speed = 1 /"// &
       "&load name = 'l' wall = 'ring' direction = 'x' force = 1 /"// &

@@ -1,4 +1,4 @@
-!> Benchmark B30: walls that yield to a stress.
+!> Benchmark B30: load-controlled walls.
 !>
 !> A plate and a block that touches it are an oscillator of known frequency. At rest the contacts bear the stress that
 !> is asked for. In a biaxial test between walls without friction, the stress of the contacts in the sample is that of
@@ -31,7 +31,7 @@ contains
       !> Whether to shear 400 grains instead of 100, with a tolerance of 1 instead of 3 %
       logical, intent(in) :: thorough
 
-      call table%begin('B30', 'walls that yield')
+      call table%begin('B30', 'load-controlled walls')
       call oscillate(table)
       call rest(table)
       call shear(table, merge(400, 100, thorough), merge(0.01_wp, 0.03_wp, thorough))
@@ -71,7 +71,7 @@ contains
                                  (place(1) - place(2))/(place(2) - place(3)), 0.05_wp)
    end subroutine oscillate
 
-   !> Three blocks between two walls that yield and two that rest.
+   !> Three blocks between two load-controlled walls and two that rest.
    subroutine rest(table)
       type(table_t), intent(inout) :: table
       character(len=*), parameter :: box = &

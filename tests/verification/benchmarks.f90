@@ -35,7 +35,7 @@ module benchmarks
    use b30_loads, only: run_loads
    use b31_materials, only: run_materials
    use b32_rolling_resistance, only: run_rolling_resistance
-   use b33_yielding_cell, only: run_yielding_cell
+   use b33_controlled_cell, only: run_controlled_cell
    use b34_arches, only: run_arches
    use s32_flat_impact, only: run_flat_impact
    use s33_corner_impact, only: run_corner_impact
@@ -136,7 +136,7 @@ contains
       case ('B32')
          call run_rolling_resistance(table)
       case ('B33')
-         call run_yielding_cell(table, thorough)
+         call run_controlled_cell(table, thorough)
       case ('B34')
          call run_arches(table, thorough)
       end select

@@ -62,7 +62,7 @@ contains
          if (load%between(1)%text == load%between(2)%text) call blame(instance, 'between', &
             'names the same wall twice; it must name two walls, as in ''left'', ''right''', error)
          if (load%between(1)%text == load%wall .or. load%between(2)%text == load%wall) call blame(instance, 'between', &
-            'names the wall that yields; the width is the distance of two other walls, across the direction '// &
+            'names the load-controlled wall; the width is the distance of two other walls, across the direction '// &
             'of the load', error)
       end if
       if (load%mass > 0.0_wp .and. load%mass < 1.0e-12_wp) call blame(instance, 'mass', &
@@ -70,11 +70,11 @@ contains
       if (load%direction /= 'angle' .and. .not. load%weight .and. &
           .not. any([instance%values(row_of(instance, 'force'))%is_given, &
                      instance%values(row_of(instance, 'stress'))%is_given])) call blame(instance, 'force', &
-         'and ''stress'' are both missing; give one of them, for example force = -100. A wall that yields to the '// &
+         'and ''stress'' are both missing; give one of them, for example force = -100. A wall moved by the '// &
          'grains alone has force = 0, one that lies on them weight = .true.', error)
       if (load%direction == 'angle' .and. .not. load%weight .and. &
           .not. instance%values(row_of(instance, 'torque'))%is_given) call blame(instance, 'torque', 'is missing; '// &
-         'give it, for example torque = 100. A wall that yields to the grains alone has torque = 0, one that '// &
+         'give it, for example torque = 100. A wall moved by the grains alone has torque = 0, one that '// &
          'swings weight = .true.', error)
       if (load%end > 0.0_wp .and. load%end <= load%start) call blame(instance, 'end', 'must be behind ''start''', &
          error, 'start')

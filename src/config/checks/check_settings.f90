@@ -202,7 +202,7 @@ contains
       call check_parts_in_cell(settings, instances, error)
       if (settings%output%trace_steps > 0) call blame(instances(index_of_instance(instances, 'output')), &
          'trace_steps', 'must be 0 in a periodic cell, where the number of boxes changes', error)
-      if (settings%cell%obeys /= 'none') call check_yielding_cell(settings, instances, error)
+      if (settings%cell%stress_controlled /= 'none') call check_stress_control(settings, instances, error)
    end subroutine check_cell
 
    !> Check that regions of grains and rows of fixed grains are not longer than the cell, whose copies would overlap.
@@ -260,31 +260,32 @@ contains
 
    end subroutine check_parts_in_cell
 
-   !> Check what cannot be combined with a cell whose size obeys a stress.
-   pure subroutine check_yielding_cell(settings, instances, error)
+   !> Check what cannot be combined with a cell whose size is stress-controlled.
+   pure subroutine check_stress_control(settings, instances, error)
       type(settings_t), intent(in) :: settings
       type(instance_t), intent(in) :: instances(:)
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
       associate (cell => instances(index_of_instance(instances, 'cell')))
-         if (abs(settings%cell%shear_rate) > 0.0_wp .and. scan(settings%cell%obeys, 'x') > 0) call blame(cell, &
-            'obeys', 'must be ''y'' in a sheared cell', error)
+         if (abs(settings%cell%shear_rate) > 0.0_wp .and. scan(settings%cell%stress_controlled, 'x') > 0) &
+            call blame(cell, 'stress_controlled', 'must be ''y'' in a sheared cell', error)
          do k = 1, 2
-            if (scan(settings%cell%obeys, 'xy'(k:k)) > 0 .or. .not. abs(settings%cell%stress(k)) > 0.0_wp) cycle
+            if (scan(settings%cell%stress_controlled, 'xy'(k:k)) > 0) cycle
+            if (.not. abs(settings%cell%stress(k)) > 0.0_wp) cycle
             call blame(cell, 'stress', 'must be 0 along '//'xy'(k:k)//', where the cell has a constant size; or '// &
-                       'give obeys = ''xy''', error)
+                       'give stress_controlled = ''xy''', error)
          end do
-         if (any(abs(settings%forces%gravity) > 0.0_wp)) call blame(cell, 'obeys', &
+         if (any(abs(settings%forces%gravity) > 0.0_wp)) call blame(cell, 'stress_controlled', &
             'needs gravity = 0, 0 in &forces, since a cell without walls falls with what it has', error)
          do k = 1, size(settings%stage)
-            if (any(abs(settings%stage(k)%gravity) > 0.0_wp)) call blame(cell, 'obeys', &
+            if (any(abs(settings%stage(k)%gravity) > 0.0_wp)) call blame(cell, 'stress_controlled', &
                'needs gravity = 0, 0 in all stages, since a cell without walls falls with what it has', error)
          end do
-         if (size(settings%source) + size(settings%sink) > 0) call blame(cell, 'obeys', &
+         if (size(settings%source) + size(settings%sink) > 0) call blame(cell, 'stress_controlled', &
             'cannot be combined with &source and &sink, whose regions do not move with the cell', error)
       end associate
-   end subroutine check_yielding_cell
+   end subroutine check_stress_control
 
    !> Raise an error about an entry.
    pure subroutine blame(instance, key, text, error)

@@ -85,7 +85,7 @@ module polydem_energy_balance
       real(wp) :: friction_work = 0.0_wp
       !> Work done by moving walls, and by gravity that changes [J/m]
       real(wp) :: wall_work = 0.0_wp
-      !> Whether walls yield to loads
+      !> Whether walls are load-controlled
       logical :: has_loads = .false.
       !> Work of the loads and of the damping of their walls, and their kinetic energy [J/m]
       real(wp) :: load_work = 0.0_wp, load_damping_work = 0.0_wp, wall_kinetic = 0.0_wp

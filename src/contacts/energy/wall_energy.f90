@@ -1,5 +1,5 @@
-!> Energy of walls in the balance: of those that yield to loads, and of those that vanish; and work of a cell that
-!> yields.
+!> Energy of walls in the balance: of those that are load-controlled, and of those that vanish; and work of a
+!> stress-controlled cell.
 module polydem_wall_energy
    use polydem_energy_balance, only: balance_t, energy_balance_t
    use polydem_kinds, only: wp
@@ -9,7 +9,7 @@ module polydem_wall_energy
 
 contains
 
-   !> Add the work of a cell that yields to the balance. The channels of the bodies have the powers of their own
+   !> Add the work of a stress-controlled cell to the balance. The channels of the bodies have the powers of their own
    !> velocities; here is what the motion of the cell adds. The cell does the opposite work, as walls do.
    pure subroutine add_cell(sums, works, energy_is_known, balance)
       !> Running sums; the energy scale may grow
@@ -39,8 +39,8 @@ contains
       if (sums%energy_scale > 0.0_wp) balance%relative_energy_residual = abs(balance%energy_residual)/sums%energy_scale
    end subroutine set_relative
 
-   !> Add the loads on walls to the balance. The work of a wall that yields is that of its load and its damping, less
-   !> its kinetic energy; the residual gets what is missing.
+   !> Add the loads on walls to the balance. The work of a load-controlled wall is that of its load and its damping,
+   !> less its kinetic energy; the residual gets what is missing.
    pure subroutine add_loads(sums, energies, balance)
       !> Running sums; the energy scale may grow
       type(energy_balance_t), intent(inout) :: sums

@@ -32,7 +32,7 @@ module polydem_stable_bodies
 contains
 
    !> Find the stable step of the free bodies that this rank moves, and a contact of the body that limits it.
-   subroutine stable_step_of_bodies(law, table, bodies, contacts, incidence, step, critical, yielding)
+   subroutine stable_step_of_bodies(law, table, bodies, contacts, incidence, step, critical, wall_mobility)
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
@@ -44,15 +44,17 @@ contains
       real(wp), intent(out) :: step
       !> Index of the contact, 0 if there are no contacts
       integer(ip), intent(out) :: critical
-      !> Mobility that each contact of a fixed body has because its wall yields, (slot) [m/kg]; absent: no wall yields
-      real(wp), intent(in), optional :: yielding(:)
+      !> Mobility that each contact of a fixed body has because its wall is load-controlled, (slot) [m/kg]; absent: no
+      !> wall is
+      real(wp), intent(in), optional :: wall_mobility(:)
       real(wp), allocatable :: steps(:), extra(:)
       integer(ip) :: k, n
 
       n = size(bodies%free, kind=ip)
       allocate (steps(n), extra(contacts%n))
       extra = 0.0_wp
-      if (present(yielding)) extra = max(yielding(contacts%first(:contacts%n)), yielding(contacts%second(:contacts%n)))
+      if (present(wall_mobility)) extra = max(wall_mobility(contacts%first(:contacts%n)), &
+                                              wall_mobility(contacts%second(:contacts%n)))
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, table, bodies, contacts, incidence, extra, steps, n) private(k)
       do k = 1_ip, n
@@ -103,7 +105,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
       type(incidence_t), intent(in) :: incidence
-      !> Mobility of the yielding wall of each contact [m/kg]
+      !> Mobility of the load-controlled wall of each contact [m/kg]
       real(wp), intent(in) :: extra(:)
       !> Slot of the body
       integer(ip), intent(in) :: s

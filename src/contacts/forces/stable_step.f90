@@ -33,7 +33,7 @@ module polydem_stable_step
 contains
 
    !> Find the stable step of the present contacts, and the contact that limits it.
-   subroutine stable_step_of_contacts(law, table, bodies, numbers, contacts, step, critical, yielding)
+   subroutine stable_step_of_contacts(law, table, bodies, numbers, contacts, step, critical, wall_mobility)
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
@@ -46,14 +46,16 @@ contains
       real(wp), intent(out) :: step
       !> Index of the contact that limits the step, 0 if there are no contacts
       integer(ip), intent(out) :: critical
-      !> Mobility that each contact of a fixed body has because its wall yields, (slot) [m/kg]; absent: no wall yields
-      real(wp), intent(in), optional :: yielding(:)
+      !> Mobility that each contact of a fixed body has because its wall is load-controlled, (slot) [m/kg]; absent: no
+      !> wall is
+      real(wp), intent(in), optional :: wall_mobility(:)
       real(wp), allocatable :: steps(:), extra(:)
       integer(ip) :: c
 
       allocate (steps(contacts%n), extra(contacts%n))
       extra = 0.0_wp
-      if (present(yielding)) extra = max(yielding(contacts%first(:contacts%n)), yielding(contacts%second(:contacts%n)))
+      if (present(wall_mobility)) extra = max(wall_mobility(contacts%first(:contacts%n)), &
+                                              wall_mobility(contacts%second(:contacts%n)))
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, table, bodies, numbers, contacts, steps, extra) private(c)
       do c = 1_ip, contacts%n
@@ -74,7 +76,7 @@ contains
    !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is
    !> assumed to have contacts with equal bodies that it hits at a given speed, with the greatest stiffness that its
    !> outline allows.
-   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth, length, damped, yielding)
+   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth, length, damped, wall_mobility)
       !> Force law; `measure` is not required
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
@@ -90,9 +92,9 @@ contains
       real(wp), intent(out) :: depth
       !> Length of that contact [m], and its stable step over that without dashpots
       real(wp), intent(out), optional :: length, damped
-      !> Greatest mobility of a wall that yields [m/kg], and greatest product of mobility and length [m2/kg]; absent: no
-      !> wall yields
-      real(wp), intent(in), optional :: yielding(2)
+      !> Greatest mobility of a load-controlled wall [m/kg], and greatest product of mobility and length [m2/kg];
+      !> absent: no wall is
+      real(wp), intent(in), optional :: wall_mobility(2)
       real(wp), allocatable :: steps(:)
       real(wp) :: unused(3), found(3), extra(2)
       integer(ip) :: k, n
@@ -104,7 +106,7 @@ contains
       if (present(length)) length = 0.0_wp
       if (present(damped)) damped = 1.0_wp
       extra = 0.0_wp
-      if (present(yielding)) extra = yielding
+      if (present(wall_mobility)) extra = wall_mobility
       if (n == 0_ip) return
       allocate (steps(n))
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
@@ -122,7 +124,7 @@ contains
    end subroutine stable_step_of_shapes
 
    !> Find the stable step of the expected contacts of a body.
-   subroutine find_expected_step(law, table, bodies, s, speed, yielding, step, found)
+   subroutine find_expected_step(law, table, bodies, s, speed, wall_mobility, step, found)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
@@ -131,7 +133,7 @@ contains
       !> Speed of approach [m/s]
       real(wp), intent(in) :: speed
       !> As in `stable_step_of_shapes`; bodies of this size cover the wall
-      real(wp), intent(in) :: yielding(2)
+      real(wp), intent(in) :: wall_mobility(2)
       !> Stable step [s]
       real(wp), intent(out) :: step
       !> Depth and length of the contact [m], and its stable step over that without dashpots
@@ -141,11 +143,11 @@ contains
 
       materials = 0_ip
       if (allocated(bodies%material)) materials = bodies%material(s)
-      call find_step_of_pair(law, table, bodies, s, materials, speed, yielding, step, found)
+      call find_step_of_pair(law, table, bodies, s, materials, speed, wall_mobility, step, found)
       if (.not. allocated(law%pairs%stiffness%factor)) return
       do partner = 0_ip, law%pairs%n_materials
          if (partner == materials(1)) cycle
-         call find_step_of_pair(law, table, bodies, s, [materials(1), partner], speed, yielding, step_with, &
+         call find_step_of_pair(law, table, bodies, s, [materials(1), partner], speed, wall_mobility, step_with, &
                                  found_with)
          if (.not. step_with < step) cycle
          step = step_with
@@ -155,7 +157,7 @@ contains
 
    !> Find the stable step of the expected contacts of a body with equal bodies or, if their material differs, with
    !> heavy ones. (The step of two light bodies of different materials is that of the lighter one on a heavy body.)
-   subroutine find_step_of_pair(law, table, bodies, s, materials, speed, yielding, step, found)
+   subroutine find_step_of_pair(law, table, bodies, s, materials, speed, wall_mobility, step, found)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
@@ -166,7 +168,7 @@ contains
       !> Speed of approach [m/s]
       real(wp), intent(in) :: speed
       !> As in `stable_step_of_shapes`; bodies of this size cover the wall
-      real(wp), intent(in) :: yielding(2)
+      real(wp), intent(in) :: wall_mobility(2)
       !> Stable step [s]
       real(wp), intent(out) :: step
       !> Depth and length of the contact [m], and its stable step over that without dashpots
@@ -177,9 +179,9 @@ contains
       number = assumed_contacts
       if (materials(1) /= materials(2)) number = 0.5_wp*assumed_contacts
       call expect_contact(law, bodies, s, materials, speed, element, outline, across, turning)
-      g(1) = number*bodies%inverse_mass(s) + (yielding(1) + yielding(2)/bodies%diameter(s))
+      g(1) = number*bodies%inverse_mass(s) + (wall_mobility(1) + wall_mobility(2)/bodies%diameter(s))
       g(2) = number*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s)) &
-             + (yielding(1) + yielding(2)/bodies%diameter(s))
+             + (wall_mobility(1) + wall_mobility(2)/bodies%diameter(s))
       g(3) = 0.0_wp
       g(4) = number*bodies%inverse_inertia(s)
       element%tangential_mass = 1.0_wp/(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
@@ -234,7 +236,7 @@ contains
       real(wp), intent(in) :: numbers(2)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
-      !> Mobility of a wall that yields [m/kg]
+      !> Mobility of a load-controlled wall [m/kg]
       real(wp), intent(in) :: extra
       type(linearised_contact_t) :: element
       real(wp) :: mobility(4, 2), lever(2, 2)

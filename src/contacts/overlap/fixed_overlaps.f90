@@ -15,11 +15,11 @@ module polydem_fixed_overlaps
 contains
 
    !> Count the pairs of fixed bodies that overlap, and find the one with the largest overlap.
-   subroutine find_fixed_overlaps(bodies, yields, n, first, second, area, place)
+   subroutine find_fixed_overlaps(bodies, is_loaded, n, first, second, area, place)
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
-      !> Whether a body yields to a load; its overlaps do not count
-      logical, intent(in) :: yields(:)
+      !> Whether a body belongs to a load-controlled wall; its overlaps do not count
+      logical, intent(in) :: is_loaded(:)
       !> Number of pairs
       integer(lp), intent(out) :: n
       !> Slots of the pair with the largest overlap, 0 if there is none
@@ -36,7 +36,7 @@ contains
       second = 0_ip
       area = 0.0_wp
       place = 0.0_wp
-      slot = pack([(s, s=1_ip, bodies%n)], bodies%fixed(:bodies%n) .and. .not. yields)
+      slot = pack([(s, s=1_ip, bodies%n)], bodies%fixed(:bodies%n) .and. .not. is_loaded)
       if (size(slot) < 2) return
       allocate (low(2, size(slot)), high(2, size(slot)), ranked(size(slot)))
       do k = 1_ip, size(slot, kind=ip)

@@ -15,7 +15,7 @@ module polydem_frame_reader
 
    !> What a checkpoint or a frame says of the periodic cell and of pieces
    type :: surroundings_t
-      !> Width and height of a cell that obeys a stress; 0 if the size of the cell is constant, or there is none [m]
+      !> Width and height of a stress-controlled cell; 0 if the size of the cell is constant, or there is none [m]
       real(wp) :: size(2) = 0.0_wp
       !> Displacement [m] and velocity [m/s] of the copy above
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp

@@ -5,7 +5,7 @@
 !>     /cell        low, size: periodic cell (in a periodic cell)
 !>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
 !>                  image (in a periodic cell), slid, shift and jump (in a sheared cell), cell_low and cell_size (if the
-!>                  size of the cell obeys a stress)
+!>                  size of the cell is stress-controlled)
 !>     /walls       id; force and torque on the fixed bodies, and present if walls vanish: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
 !>                  normal, length, force, couple: one row per contact (optional)

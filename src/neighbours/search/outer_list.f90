@@ -1,10 +1,11 @@
-!> Candidates of fat boxes: a Verlet list in which single boxes can get a new fat box.
+!> Candidates of padded boxes: a Verlet list in which single boxes can get a new padded box.
 !>
-!> A *fat box* is a box enlarged by a margin h on every side, and further in the direction in which its sides move.
-!> Pairs of boxes whose fat boxes overlap are candidates. `search_all` makes all fat boxes and finds all candidates in
-!> cells (`polydem_cell_grids`); they form rows. `search_single` makes a new fat box for one box, finds its new
-!> candidates in the cells of the last `search_all`, and appends them behind the rows. Boxes with such a fat box are
-!> *moved*; the cells contain their former fat boxes, so they are inserted late into the cells that the new ones cover.
+!> A *padded box* is a box enlarged by a margin h on every side, and further in the direction in which its sides move.
+!> Pairs of boxes whose padded boxes overlap are candidates. `search_all` makes all padded boxes and finds all
+!> candidates in cells (`polydem_cell_grids`); they form rows. `search_single` makes a new padded box for one box, finds
+!> its new candidates in the cells of the last `search_all`, and appends them behind the rows. Boxes with such a padded
+!> box are *moved*; the cells contain their former padded boxes, so they are inserted late into the cells that the new
+!> ones cover.
 !>
 !> The margin is set where two costs are equal: the searches, and the work that is done on candidates that are separate.
 !> Both are counted, so runs are reproducible. `must_search` asks for a search of all boxes when single searches have
@@ -31,14 +32,14 @@ module polydem_outer_list
    real(dp), parameter :: box_cost = 50.0_dp, candidate_cost = 22.0_dp, single_cost = 800.0_dp
    !> Initial value, lower and upper bound of the margin in units of the typical side of a box
    real(wp), parameter :: first_margin = 0.2_wp, least_margin = 2.0_wp**(-10), greatest_margin = 1.0_wp
-   !> Largest extension of a fat box in the direction of motion, in units of the margin
+   !> Largest extension of a padded box in the direction of motion, in units of the margin
    real(wp), parameter :: most_stretch = 4.0_wp
 
    !> Rows of the last search for all boxes, and behind them the candidates of single searches
    type, extends(candidate_rows_t) :: outer_list_t
-      !> Fat boxes, (4, box) [m]
-      real(wp), allocatable :: fat(:, :)
-      !> Grids of the fat boxes of the last search for all boxes
+      !> Padded boxes, (4, box) [m]
+      real(wp), allocatable :: padded(:, :)
+      !> Grids of the padded boxes of the last search for all boxes
       type(grid_query_t) :: grids
       !> Typical side of a box [m]
       real(wp) :: side = 0.0_wp
@@ -50,7 +51,7 @@ module polydem_outer_list
       real(dp), private :: singles = 0.0_dp
       !> Whether there was a search for all boxes
       logical, private :: searched = .false.
-      !> Margin of the fat boxes [m]
+      !> Margin of the padded boxes [m]
       real(wp), private :: margin = 0.0_wp
       !> Number of candidates in the rows
       integer(ip), private :: n_listed = 0_ip
@@ -91,7 +92,7 @@ contains
       list%n = 0_ip
    end subroutine free_list
 
-   !> Choose margin and grids, and make an empty list; no box is inside its fat box.
+   !> Choose margin and grids, and make an empty list; no box is inside its padded box.
    subroutine prepare(self, boxes)
       class(outer_list_t), intent(inout) :: self
       !> Boxes of the first step
@@ -106,8 +107,8 @@ contains
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
       self%grids%fine = .true.
       call self%start(boxes%n)
-      allocate (self%fat(4, boxes%n))
-      self%fat = spread([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]*huge(1.0_wp), 2, boxes%n)
+      allocate (self%padded(4, boxes%n))
+      self%padded = spread([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]*huge(1.0_wp), 2, boxes%n)
       allocate (self%first_link(boxes%n), self%met_by(boxes%n), source=0_ip)
       allocate (self%is_moved(boxes%n), source=0_bp)
       allocate (self%next_link(2, 0))
@@ -154,7 +155,7 @@ contains
          (single_cost + real(self%grids%late%n_wide(), dp))
    end function cost_of_singles
 
-   !> Set the margin, make all fat boxes, and search for all candidates. Their states are not found. The number of
+   !> Set the margin, make all padded boxes, and search for all candidates. Their states are not found. The number of
    !> candidates of the first search shows how much a wider margin costs: little where boxes are far apart.
    subroutine search_all(self, boxes, lines, n_wanted, changes)
       class(outer_list_t), intent(inout) :: self
@@ -170,14 +171,14 @@ contains
 
       call adapt_margin(self, boxes%n, n_wanted)
       call reset(self)
-      call self%update_states(boxes, self%fat, changes)
+      call self%update_states(boxes, self%padded, changes)
       call find_candidates(self, boxes, lines)
       if (.not. self%searched) then
          widen = sqrt(0.5_dp + box_cost*real(boxes%n, dp)/(candidate_cost*real(max(1_ip, sum(self%grids%found%n)), dp)))
          self%margin = self%margin*real(min(max(widen, 1.0_dp), 2.0_dp), wp)
          if (widen > 1.0_dp) call find_candidates(self, boxes, lines)
       end if
-      call self%grids%receive_fixed(self%fat)
+      call self%grids%receive_fixed(self%padded)
       call self%replace(self%grids%found, boxes, changes, with_states=.false.)
       self%n_listed = self%n
       self%searched = .true.
@@ -185,7 +186,7 @@ contains
       call self%list_by_second()
    end subroutine search_all
 
-   !> Make all fat boxes, and find the pairs of those that overlap.
+   !> Make all padded boxes, and find the pairs of those that overlap.
    subroutine find_candidates(self, boxes, lines)
       type(outer_list_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -201,7 +202,7 @@ contains
          call fatten(self, low, high, boxes%bounds, lines)
       end do
       !$omp end parallel do
-      call self%grids%build(boxes%n, self%fat)
+      call self%grids%build(boxes%n, self%padded)
       call self%grids%search(boxes)
    end subroutine find_candidates
 
@@ -234,7 +235,7 @@ contains
       self%moved%n = 0_ip
    end subroutine reset
 
-   !> Make the fat boxes low to high.
+   !> Make the padded boxes low to high.
    pure subroutine fatten(self, low, high, bounds, lines)
       type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: low, high
@@ -247,8 +248,8 @@ contains
       most = most_stretch*self%margin
       do i = low, high
          reach = lines%reaches(i, steps)
-         self%fat(1:2, i) = bounds(1:2, i) - (self%margin + min(most, max(0.0_wp, max(-reach(1:2), -reach(3:4)))))
-         self%fat(3:4, i) = bounds(3:4, i) + (self%margin + min(most, max(0.0_wp, max(reach(1:2), reach(3:4)))))
+         self%padded(1:2, i) = bounds(1:2, i) - (self%margin + min(most, max(0.0_wp, max(-reach(1:2), -reach(3:4)))))
+         self%padded(3:4, i) = bounds(3:4, i) + (self%margin + min(most, max(0.0_wp, max(reach(1:2), reach(3:4)))))
       end do
    end subroutine fatten
 
@@ -262,7 +263,7 @@ contains
       if (room < n) call grow(self%next_link, room, n + n/4_ip + 64_ip)
    end subroutine reserve_links
 
-   !> Give a box a new fat box, and append its new candidates.
+   !> Give a box a new padded box, and append its new candidates.
    subroutine search_single(self, i, boxes, lines, changes)
       class(outer_list_t), intent(inout) :: self
       !> Box
@@ -280,18 +281,18 @@ contains
       tests = self%grids%total%tests
       call meet_candidates(self, i)
       self%near%n = 0_ip
-      call self%grids%search_window(self%fat(:, i), self%near)
+      call self%grids%search_window(self%padded(:, i), self%near)
       do k = 1_ip, self%near%n
          j = self%near%at(k)
          if (self%is_moved(j) == 0_bp) call add_candidate(self, i, j, boxes, changes)
       end do
       self%near%n = 0_ip
-      call self%grids%search_late(self%fat(:, i), self%fat, self%near)
+      call self%grids%search_late(self%padded(:, i), self%padded, self%near)
       do k = 1_ip, self%near%n
          call add_candidate(self, i, self%near%at(k), boxes, changes)
       end do
       self%singles = self%singles + single_cost + real(self%grids%total%tests - tests, dp)
-      call self%grids%add_late(i, self%fat(:, i))
+      call self%grids%add_late(i, self%padded(:, i))
       if (self%is_moved(i) /= 0_bp) return
       self%is_moved(i) = 1_bp
       call self%moved%push(i)
@@ -387,9 +388,9 @@ contains
       class(outer_list_t), intent(in) :: self
 
       bytes = 0_lp
-      if (.not. allocated(self%fat)) return
+      if (.not. allocated(self%padded)) return
       bytes = self%candidate_rows_t%bytes() + self%grids%bytes() + size(self%is_moved, kind=lp) + &
-         (int(storage_size(self%fat), lp)*size(self%fat, kind=lp) + int(storage_size(self%first_link), lp)* &
+         (int(storage_size(self%padded), lp)*size(self%padded, kind=lp) + int(storage_size(self%first_link), lp)* &
           (2_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp)))/8_lp
    end function bytes_of_all
 

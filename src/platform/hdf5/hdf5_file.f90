@@ -1,4 +1,4 @@
-!> HDF5 files: the interface of this room for all other rooms. It writes and reads named numbers and texts.
+!> HDF5 files: the interface of this layer for all others. It writes and reads named numbers and texts.
 !>
 !> Names have the form /frames/position; missing groups are created. Real numbers in files are always double precision.
 !> An array (2, n) appears as (n, 2) in h5py, because the fastest dimension is the first in Fortran and the last in

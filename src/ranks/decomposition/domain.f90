@@ -40,7 +40,7 @@ module polydem_domain
       real(wp) :: most = huge(1.0_wp)
       !> Width and height of the periodic cell, 0 along an axis that is not periodic [m]
       real(wp) :: period(2) = 0.0_wp
-      !> Part of the margin that is left to the growth of a cell that yields; the other one is left to the boxes
+      !> Part of the margin that is left to the growth of a stress-controlled cell; the other one is left to the boxes
       real(wp) :: growth = 0.0_wp
       !> Median diameter of the free bodies of the run [m]
       real(wp) :: median_diameter = 0.0_wp
@@ -193,7 +193,7 @@ contains
       if (self%growth > 0.0_wp) is_off = any(abs(cell%size - self%period) > self%growth*self%margin)
    end function is_off
 
-   !> Shrink the zone of this rank by what the copies of bodies may move with a cell that yields.
+   !> Shrink the zone of this rank by what the copies of bodies may move with a stress-controlled cell.
    pure subroutine shrink_zone(self)
       class(domain_t), intent(inout) :: self
 

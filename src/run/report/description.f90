@@ -92,8 +92,8 @@ contains
          end do
          if (allocated(cell%load)) then
             do axis = 1, 2
-               if (.not. cell%load%yields(axis)) cycle
-               text = text//'; obeys '//to_text(cell%load%stress(axis), 3)//' N/m2 along '//name(axis)
+               if (.not. cell%load%is_controlled(axis)) cycle
+               text = text//'; stress-controlled at '//to_text(cell%load%stress(axis), 3)//' N/m2 along '//name(axis)
                if (cell%load%axis(axis)%damping > 0.0_wp) text = text//', closes at '// &
                   to_text(cell%load%stress(axis)*cell%size(3 - axis)/cell%load%axis(axis)%damping, 3)//' m/s'
             end do
@@ -280,7 +280,7 @@ contains
       end associate
    end function gravity_text
 
-   !> Kinds of the motions and number of bodies of each wall that moves or yields
+   !> Kinds of the motions and number of bodies of each wall that moves or is load-controlled
    function motion_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation
       character(len=:), allocatable :: text, kinds
@@ -293,7 +293,7 @@ contains
             do j = 1, size(wall%motions)
                kinds = kinds//' and '//wall%motions(j)%motion%kind
             end do
-            if (wall%is_loaded) kinds = kinds//' and yielding'
+            if (wall%is_loaded) kinds = kinds//' and load-controlled'
             text = text//', '//kinds(len(' and ') + 1:)
             text = text//' of '//counted(size(wall%slots, kind=lp), 'wall')
          end associate

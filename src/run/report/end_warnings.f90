@@ -66,7 +66,7 @@ contains
 
       associate (cell => simulation%bodies%cell, load => simulation%bodies%cell%load)
          do axis = 1, 2
-            if (.not. load%yields(axis)) cycle
+            if (.not. load%is_controlled(axis)) cycle
             borne = -load%axis(axis)%damping*load%axis(axis)%speed/cell%size(3 - axis)
             if (abs(borne) <= noticed*abs(load%stress(axis))) cycle
             call log%write_line('warning: the size of the cell along '//name(axis)//' changes at '// &

@@ -199,7 +199,7 @@ contains
             if (abs(s%load(k)%stress) > 0.0_wp) key = 'stress'
             call weigh('load.'//s%load(k)%name, key, '&load '//s%load(k)%name, load_pressure(simulation, s%load(k), k))
          end do
-         if (s%cell%obeys /= 'none') call weigh('cell', 'stress', '&cell', maxval(abs(s%cell%stress)))
+         if (s%cell%stress_controlled /= 'none') call weigh('cell', 'stress', '&cell', maxval(abs(s%cell%stress)))
          call weigh('forces', 'cohesion', '&forces or &material', law%pairs%cohesion%greatest())
       end associate
 

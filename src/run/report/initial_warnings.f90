@@ -262,23 +262,23 @@ contains
       end do
    end function motion_text
 
-   !> Warn of fixed bodies that overlap at the start, unless a load moves one of them: a wall that yields passes over
-   !> others. Every rank has all of them.
+   !> Warn of fixed bodies that overlap at the start, unless a load moves one of them: a load-controlled wall passes
+   !> over others. Every rank has all of them.
    subroutine warn_of_fixed_overlaps(simulation, warnings)
       type(simulation_t), intent(in) :: simulation
       type(text_t), allocatable, intent(inout) :: warnings(:)
       integer(lp) :: n
       integer(ip) :: first, second
       real(wp) :: area, place(2)
-      logical, allocatable :: yields(:)
+      logical, allocatable :: is_loaded(:)
       integer :: k
 
       associate (bodies => simulation%bodies)
-         yields = spread(.false., 1, bodies%n)
+         is_loaded = spread(.false., 1, bodies%n)
          do k = 1, size(simulation%walls%driven)
-            if (simulation%walls%driven(k)%is_loaded) yields(simulation%walls%driven(k)%slots) = .true.
+            if (simulation%walls%driven(k)%is_loaded) is_loaded(simulation%walls%driven(k)%slots) = .true.
          end do
-         call find_fixed_overlaps(bodies, yields, n, first, second, area, place)
+         call find_fixed_overlaps(bodies, is_loaded, n, first, second, area, place)
          if (n == 0_lp) return
          call add(warnings, counted(n, 'pair')//' of fixed bodies overlap, most of all the bodies '// &
                   to_text(bodies%id(first))//' and '//to_text(bodies%id(second))//' in '//to_text(area, 3)// &

@@ -1,4 +1,4 @@
-!> Warnings about what is asked of a wall that has vanished: to yield to a load, to move, to bound a sample.
+!> Warnings about what is asked of a wall that has vanished: to bear a load, to move, to bound a sample.
 module polydem_vanished_walls
    use polydem_wall_warnings, only: add
    use polydem_kinds, only: wp

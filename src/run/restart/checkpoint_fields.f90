@@ -18,7 +18,7 @@ module polydem_checkpoint_fields
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_packed_state, only: find_walls
    use polydem_participants, only: serialize_participants
-   use polydem_replace_bodies, only: settle_bodies
+   use polydem_replace_bodies, only: rebuild_bodies
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
@@ -80,7 +80,7 @@ contains
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
          call find_walls(former, s%bodies%id, s%walls%driven)
-         call settle_bodies(s, serializer%error)
+         call rebuild_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
 

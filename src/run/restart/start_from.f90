@@ -21,7 +21,7 @@ module polydem_start_from
    use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
    use polydem_gone_bodies, only: find_gone_rows, rows_of
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_replace_bodies, only: settle_bodies
+   use polydem_replace_bodies, only: rebuild_bodies
    use polydem_result_files, only: checkpoint_path, n_checkpoints, segment_path
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
@@ -199,7 +199,7 @@ contains
       end do
    end subroutine read_start
 
-   !> Check that the cell of the namelist is that of a result whose cell obeyed a stress.
+   !> Check that the cell of the namelist is that of a result whose cell was stress-controlled.
    subroutine check_cell_size(settings, origin, error)
       type(settings_t), intent(in) :: settings
       type(origin_t), intent(in) :: origin
@@ -348,7 +348,7 @@ contains
       call find_release(simulation)
       call find_leaving(simulation)
       simulation%loop%step = -1_lp
-      call settle_bodies(simulation, error)
+      call rebuild_bodies(simulation, error)
    end subroutine return_to_state
 
 end module polydem_start_from

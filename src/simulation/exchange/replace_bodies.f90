@@ -2,7 +2,7 @@
 !>
 !> This is a restart in memory. The bodies that stay are packed with their state, and unpacked together with the new
 !> ones; the pairs keep their contact history until the next step finds them again. What depends on the bodies is built
-!> anew, as in a restart from a checkpoint (`settle_bodies`). On several ranks the next step redistributes the bodies.
+!> anew, as in a restart from a checkpoint (`rebuild_bodies`). On several ranks the next step redistributes the bodies.
 !>
 !> Slots and global indices change; identifiers do not, and none is used twice. The caller tells the energy balance what
 !> the bodies bring and take (`polydem_changed_bodies`); the channels of new bodies begin as at time 0.
@@ -28,7 +28,7 @@ module polydem_replace_bodies
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: replace_bodies, settle_bodies, hold_history
+   public :: replace_bodies, rebuild_bodies, hold_history
 
 contains
 
@@ -87,12 +87,12 @@ contains
             self%energy_balance%wall_sum(:, slots(s)) = entering%wall_sum(:, s)
          end do
       end if
-      call settle_bodies(self, error)
+      call rebuild_bodies(self, error)
    end subroutine replace_bodies
 
    !> Build anew what depends on the bodies, after their set has changed or a checkpoint was read: boxes, guards, an
    !> empty list of pairs. The ranks forget their halos. Collective; all ranks get the same error.
-   subroutine settle_bodies(self, error)
+   subroutine rebuild_bodies(self, error)
       !> The simulation between two steps, with its bodies, walls and integrator
       type(simulation_t), intent(inout) :: self
       !> Allocated if bodies or settings are invalid
@@ -104,7 +104,7 @@ contains
       call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion%check)
       call self%domain%forget_halo()
       call self%comm%all_reduce_error(error)
-   end subroutine settle_bodies
+   end subroutine rebuild_bodies
 
    !> List the identifiers of the bodies of all ranks that leave, ascending. Collective.
    subroutine list_removed(comm, bodies, kept, removed)

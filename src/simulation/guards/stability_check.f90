@@ -14,7 +14,7 @@ module polydem_stability_check
    use polydem_wall_load, only: wall_mobilities
    implicit none
    private
-   public :: check_stability, check_suspects, find_stable_step, greatest_share
+   public :: check_stability, check_flagged, find_stable_step, greatest_share
 
 contains
 
@@ -50,10 +50,10 @@ contains
       call find_stiffest(self, greatest_share, worst)
    end function greatest_share
 
-   !> Find the suspect with the greatest dt / stable dt, each contact alone.
+   !> Find the flagged contact with the greatest dt / stable dt, each contact alone.
    subroutine find_stiffest(self, share, worst)
       type(simulation_t), intent(in) :: self
-      !> Greatest dt / stable dt, 0 if there is no suspect
+      !> Greatest dt / stable dt, 0 if there is no flagged contact
       real(wp), intent(out) :: share
       !> Its index among the flagged contacts, 0 if there is none
       integer(ip), intent(out) :: worst
@@ -74,10 +74,10 @@ contains
       end associate
    end subroutine find_stiffest
 
-   !> Compare the time step with the stable time step of each suspect alone. This finds short contacts; the stable
-   !> step of all contacts together is less (`check_stability`). All ranks get the message of the stiffest contact.
-   !> Collective.
-   subroutine check_suspects(self, share, warning, error)
+   !> Compare the time step with the stable time step of each flagged contact alone. This finds short contacts; the
+   !> stable step of all contacts together is less (`check_stability`). All ranks get the message of the stiffest
+   !> contact. Collective.
+   subroutine check_flagged(self, share, warning, error)
       type(simulation_t), intent(inout) :: self
       !> Greatest dt / stable dt of the flagged contacts of all ranks
       real(wp), intent(out) :: share
@@ -100,7 +100,7 @@ contains
       if (.not. allocated(warning) .or. share <= 1.0_wp .or. self%settings%guards%step /= 'stop') return
       call raise(error, run_error, warning)
       deallocate (warning)
-   end subroutine check_suspects
+   end subroutine check_flagged
 
    !> Sentences about a contact that is too stiff for dt: the speed of its impact and the one assumed, and the remedy
    function remedy_text(self, contacts, c) result(text)
@@ -135,19 +135,19 @@ contains
       !> Index of the contact that limits it; 0 if this rank does not have it
       integer(ip), intent(out) :: critical
       type(stability_table_t) :: table
-      real(wp), allocatable :: numbers(:), yielding(:)
+      real(wp), allocatable :: numbers(:), wall_mobility(:)
       real(wp) :: steps(2), least(2)
       integer(ip) :: limiting(2)
       integer :: k
 
       numbers = contact_numbers(self%bodies%n, self%loop%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
-      if (allocated(self%walls%loads)) yielding = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      if (allocated(self%walls%loads)) wall_mobility = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
       table = self%motion%integrator%stability()
       call stable_step_of_contacts(self%law, table, self%bodies, numbers, self%contacts, steps(1), limiting(1), &
-                                   yielding)
+                                   wall_mobility)
       call stable_step_of_bodies(self%law, table, self%bodies, self%contacts, self%loop%incidence, steps(2), &
-                                 limiting(2), yielding)
+                                 limiting(2), wall_mobility)
       least = steps
       call reduce_to_least(self%comm, least)
       ! Each of both is a bound.

@@ -9,7 +9,7 @@ module polydem_step_guard
    use polydem_motion_check, only: warn_share
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_stability_check, only: check_stability, check_suspects, greatest_share
+   use polydem_stability_check, only: check_flagged, check_stability, greatest_share
    use polydem_strings, only: to_text
    implicit none
    private
@@ -65,7 +65,7 @@ contains
          call simulation%comm%all_reduce_text(warning)
          if (stable < huge(stable)) share = simulation%dt/stable
       else if (self%is_asked) then
-         call check_suspects(simulation, share, warning, error)
+         call check_flagged(simulation, share, warning, error)
       end if
       self%greatest = max(self%greatest, share)
       if (.not. allocated(warning)) return

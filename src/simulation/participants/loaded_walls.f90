@@ -28,7 +28,7 @@ contains
 
       associate (unused => self)
       end associate
-      call simulation%walls%yield(simulation%comm, dt, time_of(simulation), present_gravity(simulation), &
+      call simulation%walls%accelerate(simulation%comm, dt, time_of(simulation), present_gravity(simulation), &
                                   simulation%bodies, simulation%loop%walls)
    end subroutine follow_forces
 

@@ -1,8 +1,8 @@
-!> A periodic cell that is sheared or whose size obeys a stress, as a participant of the steps.
+!> A periodic cell that is sheared or whose size is stress-controlled, as a participant of the steps.
 module polydem_moving_cell
    use polydem_bodies_in_cell, only: change_cell
    use polydem_cell, only: shear_cell
-   use polydem_cell_load, only: serialize_cell, yield_cell
+   use polydem_cell_load, only: accelerate_cell, serialize_cell
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: lp, wp
@@ -53,7 +53,7 @@ contains
 
       associate (unused => self)
       end associate
-      if (allocated(simulation%bodies%cell%load)) call yield_cell(simulation%comm, dt, time_of(simulation), &
+      if (allocated(simulation%bodies%cell%load)) call accelerate_cell(simulation%comm, dt, time_of(simulation), &
                                                               simulation%loop%virial, simulation%bodies%cell)
    end subroutine follow_forces
 

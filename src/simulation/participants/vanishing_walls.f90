@@ -12,7 +12,7 @@ module polydem_vanishing_walls
    use polydem_exact_sum, only: exact_sum_t
    use polydem_force_sums, only: sum_energy
    use polydem_kinds, only: ip, wp
-   use polydem_replace_bodies, only: hold_history, settle_bodies
+   use polydem_replace_bodies, only: hold_history, rebuild_bodies
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_t, simulation_t, time_of
    use polydem_wall_energy, only: release_energy
@@ -42,7 +42,7 @@ contains
          named%released = 0.0_wp
          call hold_history(simulation)
          where (named%vanishing(time_of(simulation))) named%wall%is_gone = .true.
-         call settle_bodies(simulation, error)
+         call rebuild_bodies(simulation, error)
       end associate
    end subroutine change_bodies
 

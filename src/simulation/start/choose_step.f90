@@ -40,7 +40,7 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      call set_masses_of_yielding(self, error)
+      call set_controlled_masses(self, error)
       if (allocated(error)) return
       call find_expected_speed(self)
       call stable_step_of_shapes(self%law, self%motion%integrator%stability(), self%bodies, self%expected%speed, &
@@ -89,8 +89,8 @@ contains
       call check_cell_mass(self, error)
    end subroutine choose_step
 
-   !> Set the masses of walls and of a cell that yield, if there are any. Collective.
-   subroutine set_masses_of_yielding(self, error)
+   !> Set the masses of load-controlled walls and of a stress-controlled cell, if there are any. Collective.
+   subroutine set_controlled_masses(self, error)
       type(simulation_t), intent(inout) :: self
       !> Names a load whose mass is not known
       type(error_t), allocatable, intent(inout) :: error
@@ -106,10 +106,10 @@ contains
          call reduce_to_greatest(self%comm, largest)
          call set_cell_mass(usual, self%settings%forces%stiffness, largest(1), bodies%cell%load)
       end associate
-   end subroutine set_masses_of_yielding
+   end subroutine set_controlled_masses
 
-   !> Find the mass of what yields unless it is given: that of a row of grains, which is light enough to follow their
-   !> stress. Collective.
+   !> Find the mass of what is controlled unless it is given: that of a row of grains, which is light enough to follow
+   !> their stress. Collective.
    subroutine find_usual_mass(self, usual)
       type(simulation_t), intent(inout) :: self
       !> Mass of all free bodies over the root of their number; 0 if there are none [kg/m]
@@ -121,8 +121,8 @@ contains
       end associate
    end subroutine find_usual_mass
 
-   !> Check that a cell that yields is not too light for the step. Its size oscillates at most with the stiffness E of
-   !> its contents, times the ratio of its sides.
+   !> Check that a stress-controlled cell is not too light for the step. Its size oscillates at most with the stiffness
+   !> E of its contents, times the ratio of its sides.
    subroutine check_cell_mass(self, error)
       type(simulation_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
@@ -139,7 +139,7 @@ contains
       end associate
    end subroutine check_cell_mass
 
-   !> Set the masses of walls that yield.
+   !> Set the masses of load-controlled walls.
    subroutine prepare_loads(self, usual, error)
       type(simulation_t), intent(inout) :: self
       !> Mass of a wall without a mass of its own; 0: there is none [kg/m]
@@ -250,7 +250,8 @@ contains
       end do
    end function short_number
 
-   !> Greatest mobility of a wall that yields [m/kg], and greatest product of mobility and length of the wall [m2/kg]
+   !> Greatest mobility of a load-controlled wall [m/kg], and greatest product of mobility and length of the wall
+   !> [m2/kg]
    pure function mobility_of_walls(self) result(greatest)
       type(simulation_t), intent(in) :: self
       real(wp) :: greatest(2), extent(2, 2)

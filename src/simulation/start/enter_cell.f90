@@ -47,7 +47,7 @@ contains
          ! A velocity beyond the profile is that of all copies.
          if (settings%cell%profile) bodies%cell%former_jump = 0.0_wp
          if (settings%scene%name == 'result') bodies%cell%former_jump = former_jump
-         if (settings%cell%obeys /= 'none') call let_yield(settings, bodies%cell)
+         if (settings%cell%stress_controlled /= 'none') call control_stress(settings, bodies%cell)
          call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
          call find_folds(bodies)
          largest = 0.0_wp
@@ -100,8 +100,8 @@ contains
       end associate
    end subroutine join_copies
 
-   !> Let the size of the cell obey a stress. Its mass is set later.
-   subroutine let_yield(settings, cell)
+   !> Let a stress control the size of the cell. Its mass is set later.
+   subroutine control_stress(settings, cell)
       type(settings_t), intent(in) :: settings
       type(cell_t), intent(inout) :: cell
       integer :: axis
@@ -109,7 +109,7 @@ contains
       allocate (cell%load)
       associate (load => cell%load, given => settings%cell)
          do axis = 1, 2
-            load%yields(axis) = scan(given%obeys, 'xy'(axis:axis)) > 0
+            load%is_controlled(axis) = scan(given%stress_controlled, 'xy'(axis:axis)) > 0
          end do
          load%stress = given%stress
          load%axis%window_t = new_window(0.0_wp, 0.0_wp, given%stress_ramp, number_of_stage(settings, given%stage))
@@ -118,9 +118,9 @@ contains
          load%axis%place = cell%size
          load%centre = cell%low + 0.5_wp*cell%size
       end associate
-   end subroutine let_yield
+   end subroutine control_stress
 
-   !> Check that no constraint on velocities acts in a sheared cell, in one that yields, or with local damping.
+   !> Check that no constraint on velocities acts in a sheared cell, in a stress-controlled one, or with local damping.
    subroutine check_constraint(self, error)
       !> The simulation with its force law
       type(simulation_t), intent(in) :: self
@@ -131,8 +131,8 @@ contains
          place_of(self%settings, 'cell', 'shear_rate')//': ''shear_rate'' in &cell cannot be combined with this '// &
          '''friction'' in &forces, which does not know the velocity of the border; use cundall_strack')
       if (allocated(self%bodies%cell%load) .and. allocated(self%law%constraint)) call raise(error, input_error, &
-         place_of(self%settings, 'cell', 'obeys')//': ''obeys'' in &cell cannot be combined with this '// &
-         '''friction'' in &forces, which does not know how the cell grows; use cundall_strack')
+         place_of(self%settings, 'cell', 'stress_controlled')//': ''stress_controlled'' in &cell cannot be '// &
+         'combined with this ''friction'' in &forces, which does not know how the cell grows; use cundall_strack')
       if (self%settings%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
          input_error, place_of(self%settings, 'forces', 'local_damping')//': ''local_damping'' in &forces cannot '// &
          'be combined with this ''friction'', whose forces depend on the motion without it; use drag')
@@ -151,8 +151,9 @@ contains
 
       associate (bodies => self%bodies, cell => self%bodies%cell)
          if (bodies%fixed(s) .and. allocated(cell%load)) then
-            call raise(error, input_error, place_of(self%settings, 'cell', 'obeys')//': ''obeys'' in &cell: body '// &
-               to_text(bodies%id(s))//' is fixed, but a cell whose size obeys a stress can have no fixed bodies')
+            call raise(error, input_error, place_of(self%settings, 'cell', 'stress_controlled')// &
+               ': ''stress_controlled'' in &cell: body '//to_text(bodies%id(s))// &
+               ' is fixed, but a stress-controlled cell can have no fixed bodies')
             error%place = int(bodies%global_index(s), lp)
             return
          end if

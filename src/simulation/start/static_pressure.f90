@@ -2,7 +2,7 @@
 !>
 !> It is the greatest of three: the weight of the free bodies under their full height along gravity, of all stages the
 !> greatest; the stress of a load, or its force over the width of its wall, with the weight of a wall whose mass is
-!> given; and the stress that a cell obeys. It is that of the bodies at the start.
+!> given; and the stress that controls a cell. It is that of the bodies at the start.
 module polydem_static_pressure
    use polydem_driven, only: along_angle
    use polydem_elementary, only: hypotenuse
@@ -55,7 +55,7 @@ contains
             call consider(self, load_pressure(self, load, k), 'of &load '//load%name)
          end associate
       end do
-      if (self%settings%cell%obeys /= 'none') &
+      if (self%settings%cell%stress_controlled /= 'none') &
          call consider(self, maxval(abs(self%settings%cell%stress)), 'of &cell')
    end subroutine find_static_pressure
 

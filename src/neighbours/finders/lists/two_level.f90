@@ -1,15 +1,15 @@
 !> Two-level list: a Verlet list with wide margins, and a filter that compares only pairs whose state can change.
 !>
-!> `polydem_outer_list` holds the candidates, the pairs of boxes whose fat boxes overlap. As long as all boxes lie
-!> inside their fat boxes, only candidates can overlap.
+!> `polydem_outer_list` holds the candidates, the pairs of boxes whose padded boxes overlap. As long as all boxes lie
+!> inside their padded boxes, only candidates can overlap.
 !>
 !> `polydem_inner_list` predicts straight lines for all sides and divides time into intervals. At the start of an
 !> interval it classifies all candidates, and in each step it finds the boxes that are off their lines. Only the active
-!> candidates are compared, a tenth of all in a drum. No box on its lines can leave its fat box, because this is tested
-!> when the lines are drawn.
+!> candidates are compared, a tenth of all in a drum. No box on its lines can leave its padded box, because this is
+!> tested when the lines are drawn.
 !>
-!> A box that leaves its fat box, or will if it follows its lines, gets a new one by a search for this box alone. So one
-!> fast box costs only the search for its own candidates.
+!> A box that leaves its padded box, or will if it follows its lines, gets a new one by a search for this box alone. So
+!> one fast box costs only the search for its own candidates.
 module polydem_two_level
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: lies_inside
@@ -26,7 +26,7 @@ module polydem_two_level
    private
    public :: two_level_t
 
-   !> Length up to which intervals are not shortened to keep boxes inside their fat boxes [steps]
+   !> Length up to which intervals are not shortened to keep boxes inside their padded boxes [steps]
    integer(ip), parameter :: shortest = 16_ip
 
    !> Finder with a list of candidates and a filter of the candidates
@@ -60,7 +60,7 @@ contains
 
       call self%filter%begin_step()
       tests = self%list%grids%total%tests
-      if (allocated(self%list%fat)) then
+      if (allocated(self%list%padded)) then
          self%list%age = self%list%age + 1_lp
          if (.not. must_begin(self)) call follow_lines(self, boxes)
       else
@@ -83,27 +83,28 @@ contains
       must_begin = self%filter%is_due(self%list%n) .or. self%list%must_search()
    end function must_begin
 
-   !> Find the boxes that left their lines and review their candidates. Search for boxes that can leave their fat boxes.
+   !> Find the boxes that left their lines and review their candidates. Search for boxes that can leave their padded
+   !> boxes.
    subroutine follow_lines(self, boxes)
       type(two_level_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: k, i
 
-      call self%filter%follow_lines(boxes, self%list%fat)
+      call self%filter%follow_lines(boxes, self%list%padded)
       call self%work%lap(phase_structure)
       do k = 1_ip, self%filter%strays%n
          if (must_begin(self)) return
          i = self%filter%strays%at(k)
          if (.not. self%filter%leaves_often(i)) then
             call search_single(self, i, boxes)
-            if (self%filter%stays_inside(i, self%list%fat(:, i))) cycle
+            if (self%filter%stays_inside(i, self%list%padded(:, i))) cycle
          end if
          call self%filter%activate_candidates_of(i, self%list)
       end do
       do k = 1_ip, self%filter%off%n
          if (must_begin(self)) return
          i = self%filter%off%at(k)
-         if (.not. lies_inside(boxes%bounds(:, i), self%list%fat(:, i))) call search_single(self, i, boxes)
+         if (.not. lies_inside(boxes%bounds(:, i), self%list%padded(:, i))) call search_single(self, i, boxes)
       end do
       if (.not. must_begin(self)) call self%filter%review_left(self%list)
       call self%work%lap(phase_search)
@@ -123,7 +124,7 @@ contains
       end do
    end subroutine search_single
 
-   !> Begin an interval: new lines, new fat boxes where they are needed, and a classification of all candidates.
+   !> Begin an interval: new lines, new padded boxes where they are needed, and a classification of all candidates.
    subroutine begin_interval(self, boxes)
       type(two_level_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -143,7 +144,7 @@ contains
          self%filter%length = longest
          call self%list%search_all(boxes, self%filter, n_wanted, self%filter%changes%of)
          call self%work%add(count_rebuilds, 1_lp)
-         call self%filter%list_strays(self%list%fat)
+         call self%filter%list_strays(self%list%padded)
       else
          do k = 1_ip, self%filter%strays%n
             call self%list%search_single(self%filter%strays%at(k), boxes, self%filter, self%filter%changes%of(1))
@@ -155,27 +156,27 @@ contains
          real(self%list%n - self%filter%active%n - self%filter%active%n_sure, dp)
       do k = 1_ip, self%filter%strays%n
          i = self%filter%strays%at(k)
-         if (.not. self%filter%stays_inside(i, self%list%fat(:, i))) &
+         if (.not. self%filter%stays_inside(i, self%list%padded(:, i))) &
             call self%filter%activate_candidates_of(i, self%list)
       end do
       if (searched) call self%filter%find_active_states(boxes)
       call self%work%lap(phase_structure)
    end subroutine begin_interval
 
-   !> List the boxes that can leave their fat boxes in the interval, and shorten the interval while this makes single
+   !> List the boxes that can leave their padded boxes in the interval, and shorten the interval while this makes single
    !> searches and intervals together cheaper per step.
    subroutine choose_length(self)
       type(two_level_t), intent(inout) :: self
       type(index_list_t) :: strays
       real(dp) :: cost
 
-      call self%filter%list_strays(self%list%fat)
+      call self%filter%list_strays(self%list%padded)
       do while (self%filter%length > shortest)
          cost = self%list%cost_of_singles(self%filter%strays%n)
          if (cost <= self%filter%interval_cost(self%list%n)) exit
          strays = self%filter%strays
          self%filter%length = self%filter%length/2_ip
-         call self%filter%shorten_strays(self%list%fat)
+         call self%filter%shorten_strays(self%list%padded)
          if (cost > self%filter%interval_cost(self%list%n) + &
              2.0_dp*self%list%cost_of_singles(self%filter%strays%n)) cycle
          self%filter%length = 2_ip*self%filter%length
@@ -188,7 +189,7 @@ contains
    subroutine survey(self)
       class(two_level_t), intent(inout) :: self
 
-      if (.not. allocated(self%list%fat)) return
+      if (.not. allocated(self%list%padded)) return
       self%work%value(count_searches) = self%list%grids%total%searches
       self%work%value(count_visits) = self%list%grids%total%visits
       self%work%value(count_candidates) = int(self%list%n, lp)

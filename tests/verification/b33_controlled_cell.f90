@@ -1,10 +1,10 @@
-!> Benchmark B33: a periodic cell whose size obeys a stress.
+!> Benchmark B33: a periodic cell whose size is stress-controlled.
 !>
-!> A column of blocks in a cell that yields is an oscillator of known frequency. At rest the contacts bear the stress
-!> that is asked for, and in a steady shear flow their mean stress is that. The energy that is missing, with the work of
-!> the cell, is of first order in dt, since places are stretched before the motion of a step. The place of the border
-!> has no meaning.
-module b33_yielding_cell
+!> A column of blocks in a stress-controlled cell is an oscillator of known frequency. At rest the contacts bear the
+!> stress that is asked for, and in a steady shear flow their mean stress is that. The energy that is missing, with the
+!> work of the cell, is of first order in dt, since places are stretched before the motion of a step. The place of the
+!> border has no meaning.
+module b33_controlled_cell
    use trial, only: begin_scene, find_missing_energy, steps
    use verification_table, only: table_t
    use polydem_bodies, only: bodies_t
@@ -17,33 +17,35 @@ module b33_yielding_cell
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: run_yielding_cell
+   public :: run_controlled_cell
 
 contains
 
    !> Oscillator, rest, energy, border, flow.
-   subroutine run_yielding_cell(table, thorough)
+   subroutine run_controlled_cell(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
       !> Whether to take a long mean of the flow, which then has a tolerance of 1 instead of 3 %
       logical, intent(in) :: thorough
 
-      call table%begin('B33', 'cell that yields')
+      call table%begin('B33', 'stress-controlled cell')
       call oscillate(table)
       call rest(table)
       call close_energy(table)
-      call move_border(table, 'another border', 'obeys = ''xy'' stress = 1e4, 1.2e4 damping_ratio = 0.2')
+      call move_border(table, 'another border', 'stress_controlled = ''xy'' stress = 1e4, 1.2e4 damping_ratio = 0.2')
       call move_border(table, 'another border of a sheared cell', &
-                       'shear_rate = 2 shear_ramp = 0.03 obeys = ''y'' stress = 0, 1.2e4 damping_ratio = 0.2')
+                       'shear_rate = 2 shear_ramp = 0.03 stress_controlled = ''y'' stress = 0, 1.2e4 '// &
+                       'damping_ratio = 0.2')
       call flow(table, merge(12.0_wp, 2.0_wp, thorough), merge(0.01_wp, 0.03_wp, thorough))
-   end subroutine run_yielding_cell
+   end subroutine run_controlled_cell
 
    !> Three blocks on top of each other, pressed together and released. They do not part in this time.
    subroutine oscillate(table)
       type(table_t), intent(inout) :: table
       real(wp), parameter :: depth = 1.0e-5_wp, duration = 0.03_wp, mass = 20.0_wp
       character(len=*), parameter :: blocks = &
-         '&cell periodic = ''xy'' low = -0.15, 0 size = 0.3, 0.29997 obeys = ''y'' mass = 20 damping_ratio = 0 / '// &
+         '&cell periodic = ''xy'' low = -0.15, 0 size = 0.3, 0.29997 stress_controlled = ''y'' mass = 20 '// &
+         'damping_ratio = 0 / '// &
          '&grains name = ''b'' region = ''at'' at = 0, 0.049995 shape = ''rectangle'' width = 0.1 height = 0.1 '// &
          'density = 1000 / '// &
          '&grains name = ''c'' region = ''at'' at = 0, 0.149985 shape = ''rectangle'' width = 0.1 height = 0.1 '// &
@@ -100,7 +102,7 @@ contains
       type(error_t), allocatable :: error
       real(wp) :: tensor(2, 2)
 
-      call begin_scene(sample('obeys = ''xy'' stress = 1e4, 1.2e4', 'duration = 1.2'), simulation, error)
+      call begin_scene(sample('stress_controlled = ''xy'' stress = 1e4, 1.2e4', 'duration = 1.2'), simulation, error)
       if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
       call table%note_error(error)
       if (allocated(error)) return
@@ -122,8 +124,9 @@ contains
    !> The energy that is missing after a fast compression, with the time step and with a half of it.
    subroutine close_energy(table)
       type(table_t), intent(inout) :: table
-      character(len=*), parameter :: cell = 'obeys = ''xy'' stress = 1e4, 1.2e4 mass = 21 damping_ratio = 0.2', &
-         shear = 'obeys = ''y'' stress = 0, 1.2e4 damping_ratio = 0.2 shear_rate = 2 shear_ramp = 0.1'
+      character(len=*), parameter :: &
+         cell = 'stress_controlled = ''xy'' stress = 1e4, 1.2e4 mass = 21 damping_ratio = 0.2', &
+         shear = 'stress_controlled = ''y'' stress = 0, 1.2e4 damping_ratio = 0.2 shear_rate = 2 shear_ramp = 0.1'
       type(error_t), allocatable :: error
       real(wp) :: missing(2), work
 
@@ -192,7 +195,7 @@ contains
       real(wp) :: tensor(2, 2), mean(2, 2)
       integer :: k, n
 
-      call begin_scene(sample('obeys = ''y'' stress = 0, 1e4 shear_rate = 2 shear_ramp = 0.1', &
+      call begin_scene(sample('stress_controlled = ''y'' stress = 0, 1e4 shear_rate = 2 shear_ramp = 0.1', &
                               'duration = '//to_text(1.0_wp + duration, 6)), simulation, error)
       mean = 0.0_wp
       n = 0
@@ -211,4 +214,4 @@ contains
       call table%show('shear flow: mean stress ratio', -mean(2, 1)/mean(2, 2))
    end subroutine flow
 
-end module b33_yielding_cell
+end module b33_controlled_cell
