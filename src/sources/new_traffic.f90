@@ -33,9 +33,9 @@ contains
             seed = given%seed
             if (seed == 0_ip) seed = modulo(settings%scene%seed + 1001_ip*k, huge(1_ip))
             call new_source(given, seed, traffic%sources(k))
-            if (given%outlines /= '') call read_outlines(given%outlines, traffic%sources(k)%settings%outline, &
-                                                         traffic%sources(k)%settings%outline_corners, &
-                                                         traffic%sources(k)%settings%outline_pieces, error)
+            if (given%outlines /= '') call read_outlines(given%outlines, traffic%sources(k)%group%outline, &
+                                                         traffic%sources(k)%group%outline_corners, &
+                                                         traffic%sources(k)%group%outline_pieces, error)
             if (allocated(error)) error%message = place_of(settings, 'source.'//given%name, 'outlines')// &
                ': &source '//given%name//': outlines: '//error%message
             if (allocated(error)) return

@@ -39,10 +39,11 @@ module polydem_source
       integer(lp) :: since = 0_lp, before = 0_lp
       !> Mass that has entered [kg/m]
       real(wp) :: mass = 0.0_wp
+      !> Its shapes as those of a group of grains of one size
+      type(grains_settings_t) :: group
       !> Random numbers of shapes and of places
       type(random_t) :: shapes, places
    contains
-      procedure, private :: as_group
       procedure :: most_pieces
       procedure :: mean_mass
       procedure :: draw_shape
@@ -76,6 +77,7 @@ contains
       type(source_t), intent(out) :: source
 
       source%settings = settings
+      source%group = as_group(settings)
       source%shapes = new_random(seed)
       source%places = new_random(ieor(seed, 65536_ip))
    end subroutine new_source
@@ -87,11 +89,9 @@ contains
       type(random_t), intent(inout) :: random
       !> Its corners and radius are set
       type(candidate_t), intent(inout) :: candidate
-      type(grains_settings_t) :: group
       type(grains_t) :: grains
 
-      group = self%as_group()
-      call draw_grains(group, random, 1_ip, grains)
+      call draw_grains(self%group, random, 1_ip, grains)
       candidate%corners = grains%polygon(1_ip)
       candidate%piece = grains%pieces_of(1_ip)
       associate (s => self%settings)
@@ -104,14 +104,14 @@ contains
       candidate%radius = maxval(hypotenuse(candidate%corners(1, :), candidate%corners(2, :)))
    end subroutine draw_shape
 
-   !> The shapes of the source as those of a group of grains of one size
-   function as_group(self) result(group)
-      class(source_t), intent(in) :: self
+   !> The shapes of a source as those of a group of grains of one size
+   function as_group(settings) result(group)
+      type(source_settings_t), intent(in) :: settings
       type(grains_settings_t) :: group, blank
 
-      blank = new_grains(self%settings%name)
+      blank = new_grains(settings%name)
       group = blank
-      group%shape_settings_t = self%settings%shape_settings_t
+      group%shape_settings_t = settings%shape_settings_t
       group%sizes = blank%sizes
       group%size_ratio = blank%size_ratio
    end function as_group
@@ -120,7 +120,7 @@ contains
    integer(ip) function most_pieces(self)
       class(source_t), intent(in) :: self
 
-      most_pieces = most_pieces_of(self%as_group())
+      most_pieces = most_pieces_of(self%group)
    end function most_pieces
 
    !> Mean mass of the first bodies [kg/m]
