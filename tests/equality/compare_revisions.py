@@ -31,6 +31,8 @@ from guard_runs import GuardError, Side, call, extract, write_bodies
 ROOT = guard_python.ROOT
 #: Updates of bodies in a shortened run of inputs, and the greatest number of its steps
 WORK, MOST_STEPS = 1_500_000, 4000
+#: Body of a group &stage
+STAGE = re.compile(r"^\s*&stage\b(.*?)/\s*$", re.MULTILINE | re.DOTALL)
 #: Settings of the bed from which drums are packed: it need not rest, but is looser then
 PATCH = {"integrate.duration": "0.15"}
 
@@ -69,14 +71,29 @@ def shorten(base, source, extra=None):
         settings["scene.speed"] = "2.0"
     code, output = base.run(["check", str(base.sources / "inputs" / f"{source}.nml"), *base.overrides(settings)])
     found = [re.search(pattern, output) for pattern in (
-        r"\nbodies +(\d+) free, (\d+) fixed", r"\nduration +(\S+) s, (\d+) steps")]
+        r"\nbodies +(\d+) free, (\d+) fixed", r"\nduration +(?:at most )?(\S+) s, (\d+) steps")]
     if code != 0 or None in found:
         raise GuardError(f"inputs/{source}.nml: check ended with {code}:\n{output[-2000:]}")
     bodies, steps = int(found[0][1]) + int(found[0][2]), int(found[1][2])
     fewer = min(steps, MOST_STEPS, max(20, WORK // bodies))
     duration = float(found[1][1]) * fewer / steps
-    settings.update({"integrate.duration": f"{duration:.8g}", "output.frame_interval": f"{duration / 5:.8g}"})
+    settings.update({**durations(text, duration), "output.frame_interval": f"{duration / 5:.8g}"})
     return Case(f"{'packed' if extra else 'inputs'}/{source}", settings, source)
+
+
+def durations(text, duration):
+    """Overrides that make a run take a time: that of the run, or of its stages, each with its share."""
+    stages = [re.sub("!.*", "", body) for body in STAGE.findall(text)]
+    found = {} if stages else {"integrate.duration": f"{duration:.8g}"}
+    for body in stages:
+        name = re.search(r"name *= *'(\w+)'", body)[1]
+        stage = f"stage.{name}"
+        if re.search(r"until *= *'(?!duration)", body):
+            found.update({f"{stage}.longest": f"{duration / len(stages):.8g}", f"{stage}.at_limit": "next",
+                          f"{stage}.check": "10", f"{stage}.hold": "0"})
+        else:
+            found[f"{stage}.duration"] = f"{duration / len(stages):.8g}"
+    return found
 
 
 def list_cases(base):
