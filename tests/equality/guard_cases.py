@@ -1,7 +1,7 @@
-"""The runs that the guard compares, in the names of the base revision.
+"""The runs that the guard compares, in the names of the present tree.
 
-What there is to choose is read from the table of namelist entries in the manual of the base revision, so that no
-entry and no choice is left out: one that needs a value of its own and has none in VARIED is an error.
+What there is to choose is read from the table of namelist entries in the manual, so that no entry and no choice is
+left out: one that needs a value of its own and has none in VARIED is an error.
 """
 
 import itertools
@@ -11,16 +11,16 @@ from dataclasses import dataclass
 #: Small scenes with contacts from the start to the end, by the word of scene.name; bodies are soft, so steps are large
 SOFT = {"forces.gravity": "0, -80", "forces.stiffness": "2e5"}
 SCENES = {
-    "drum": {**SOFT, "scene.name": "drum", "scene.bodies": "80", "scene.speed": "1.0", "scene.motion": "rotation",
-             "scene.motion_rate": "2", "integrate.duration": "0.03"},
+    "drum": {**SOFT, "scene.name": "drum", "scene.bodies": "80", "scene.speed": "1.0", "motion.turn.kind": "rotation",
+             "motion.turn.rate": "2", "integrate.duration": "0.03"},
     "hopper": {**SOFT, "scene.name": "hopper", "scene.bodies": "60", "scene.opening": "0.04", "scene.slope": "60",
                "scene.speed": "1.0", "integrate.duration": "0.03"},
-    "gas": {**SOFT, "scene.name": "gas", "scene.bodies": "80", "scene.fraction": "0.35", "scene.speed": "1.0",
+    "gas": {**SOFT, "scene.name": "gas", "scene.bodies": "80", "scene.solid_fraction": "0.35", "scene.speed": "1.0",
             "scene.spin": "50", "integrate.duration": "0.02"},
     "bed": {**SOFT, "scene.name": "bed", "scene.bodies": "80", "scene.speed": "2.0", "integrate.duration": "0.03"},
     "heap": {**SOFT, "scene.name": "heap", "scene.bodies": "60", "scene.speed": "1.0", "integrate.duration": "0.03"},
-    "channel": {**SOFT, "scene.name": "channel", "scene.bodies": "60", "scene.fraction": "0.3", "scene.speed": "1.0",
-                "integrate.duration": "0.03"},
+    "channel": {**SOFT, "scene.name": "channel", "scene.bodies": "60", "scene.solid_fraction": "0.3",
+                "scene.speed": "1.0", "integrate.duration": "0.03"},
     "incline": {**SOFT, "scene.name": "incline", "scene.width": "0.02", "scene.height": "0.01", "scene.slope": "30",
                 "scene.speed": "0.1", "integrate.duration": "0.03"},
     "stack": {**SOFT, "scene.name": "stack", "scene.bodies": "6", "scene.width": "0.01", "scene.height": "0.01",
@@ -33,8 +33,8 @@ SCENES = {
              "integrate.duration": "0.01"},
 }
 #: Grains of many sizes under a shaking wall: every finder, several processes
-SIZES = {**SCENES["bed"], "scene.bodies": "200", "scene.size_ratio": "10", "scene.motion": "oscillation",
-         "scene.motion_amplitude": "1e-3, 2e-3", "scene.motion_frequency": "100"}
+SIZES = {**SCENES["bed"], "scene.bodies": "200", "scene.size_ratio": "10", "motion.shake.kind": "oscillation",
+         "motion.shake.amplitude": "1e-3, 2e-3", "motion.shake.frequency": "100"}
 #: Frames with everything in them, some to a segment; nothing that depends on the time that something takes
 OUTPUT = {"output.contacts": ".true.", "output.frames_per_segment": "4", "decomposition.balance": "counted"}
 N_FRAMES = 10
@@ -61,12 +61,12 @@ GUARDS = {
     "displacement_stops": {"forces.gravity": "0, -5e5"},
     "displacement_warns": {"guards.displacement": "warn", "guards.displacement_limit": "1e-3"},
     "step_stops": {"integrate.dt": "1e-2"},
-    "step_warns": {"guards.step": "warn", "integrate.fraction": "0.6"},
+    "step_warns": {"guards.step": "warn", "integrate.safety_factor": "0.6"},
     "overlap_stops": {"guards.overlap": "stop", "guards.overlap_limit": "1e-3"},
     "overlap_warns": {"guards.overlap": "warn", "guards.overlap_limit": "1e-3"},
     "energy_stops": {"guards.energy": "stop", "guards.energy_limit": "1e-9", "forces.damping": "none"},
     "energy_warns": {"guards.energy": "warn", "guards.energy_limit": "1e-9", "forces.damping": "none"},
-    "relaxed": {**SCENES["gas"], "scene.overlap": ".true.", "guards.relaxed_depth": "0.05"},
+    "relaxed": {**SCENES["gas"], "scene.overlap": ".true.", "scene.remove_overlap": "0.05"},
     "listed": {**SCENES["gas"], "scene.overlap": ".true.", "guards.listed_depth": "1e-4", "guards.step": "warn",
                "guards.displacement": "off"},
 }
@@ -79,16 +79,13 @@ PARTS = (f"grains.{NAME}.", f"wall.{NAME}.")
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene. Those of
 #: materials and of pairs are those of &forces
 VARIED = {
-    "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.corners_min": "3",
-    "scene.corners_max": "20", "scene.short_axis": "7.5e-3", "scene.long_axis_min": "9e-3",
-    "scene.long_axis_max": "15e-3", "scene.size_ratio": "5", "scene.density": "1000", "scene.radius": "0.08",
+    "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.corners": "3, 20",
+    "scene.short_axis": "7.5e-3", "scene.long_axis": "9e-3, 15e-3", "scene.remove_overlap": "1e-3",
+    "scene.size_ratio": "5", "scene.density": "1000", "scene.radius": "0.08",
     "scene.width": "0.15",
     "scene.width@heap": "1.0", "scene.width@incline": "0.03", "scene.width@stack": "0.02", "scene.height": "0.015",
-    "scene.opening": "0.05", "scene.slope": "40", "scene.fraction": "0.25", "scene.speed": "1.5", "scene.spin": "20",
-    "scene.moving_grains": "5", "scene.motion_pivot": "0.01, 0.02", "scene.motion_rate": "1",
-    "scene.motion_velocity": "0.1, 0.2",
-    "scene.motion_amplitude": "1e-3, 0", "scene.motion_frequency": "50", "scene.motion_start": "0.005",
-    "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84",
+    "scene.opening": "0.05", "scene.slope": "40", "scene.solid_fraction": "0.25", "scene.speed": "1.5",
+    "scene.spin": "20", "scene.moving_grains": "5",
     "motion.one.bodies": "82, 84", "motion.one.pivot": "0.01, 0.02", "motion.one.rate": "1",
     "motion.one.velocity": "0.1, 0.2", "motion.one.amplitude": "1e-3, 0", "motion.one.frequency": "50",
     "motion.one.start": "0.005", "motion.one.ramp": "0.01", "motion.one.end": "0.02",
@@ -130,8 +127,8 @@ VARIED = {
     "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
     "wall.one.material": "one", "material.one.density": "1000", "contact_pair.one.materials": "one', 'one",
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
-    "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
-    "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
+    "guards.listed_depth": "1e-4",
+    "integrate.dt": "5e-5", "integrate.safety_factor": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
     "decomposition.margin": "1e-3", "decomposition.imbalance": "2",
     "output.frame_interval": "0.002", "output.frames_per_segment": "3",
     "output.log_interval": "1e-3",
@@ -171,10 +168,10 @@ ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precisi
              "cell.shear_ramp": "as cell.shear_rate",
              "grains.one.packing": "as scene.packing",
              "grains.one.number": "blocks of scene.name = stack", "grains.one.outlines": "test_shapes.pf",
-             "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
+             "checkpoint.wall_interval": "nowhere: what it does depends on the time that steps take"}
 
 #: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
-UNTRIED = {*(("cell.obeys", axes) for axes in ("x", "y", "xy")),
+UNTRIED = {*(("cell.stress_controlled", axes) for axes in ("x", "y", "xy")),
            *(("source.one.shape", shape) for shape in ("regular", "random", "rectangle", "outline")),
            *(("source.one.sizes", sizes) for sizes in ("log_normal", "grading")),
            ("grains.one.shape", "outline"), ("grains.one.arrangement", "voronoi"),
@@ -305,14 +302,13 @@ def entry_cases(entries):
 
 def base_of(entry, base):
     """Settings without what excludes an entry, and with what its group needs."""
-    if entry.name == "scene.motion" or entry.name.startswith("motion."):
-        base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
     if entry.name == "forces.stiffness_over_pressure":
         base = {key: value for key, value in base.items() if key != "forces.stiffness"}
     if entry.name.startswith("stage."):
         del base["integrate.duration"]
         base.setdefault(f"stage.{NAME}.until", "duration")
     if entry.name.startswith("motion."):
+        base = {key: value for key, value in base.items() if not key.startswith("motion.")}
         base.setdefault(f"motion.{NAME}.kind", "rotation")
     if entry.name.startswith("load."):
         base = {f"load.{NAME}.wall": NAME, f"load.{NAME}.direction": "x", **base}
@@ -347,7 +343,7 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED.get(entry.name) for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith(("scene.motion_", "motion.", "stage.", "load.", "sample.", *PARTS))
+            and entry.name.startswith(("motion.", "stage.", "load.", "sample.", *PARTS))
             and entry.condition
             and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
@@ -372,7 +368,7 @@ def elsewhere(entry):
     """Where an entry without a value is tried; empty: nowhere."""
     if entry.name.startswith((f"source.{NAME}.", f"sink.{NAME}.")):
         return "tests/ranks: scene flow"
-    if entry.condition and entry.condition[0] == "cell.obeys":
+    if entry.condition and entry.condition[0] == "cell.stress_controlled":
         return "tests/ranks: scene controlled"
     return ELSEWHERE.get(entry.name, "")
 

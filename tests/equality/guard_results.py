@@ -1,4 +1,4 @@
-"""What a run leaves, under the names of the base revision, and how two of them differ."""
+"""What a run leaves, under the names of the present tree, and how two of them differ."""
 
 import re
 from pathlib import Path
@@ -24,7 +24,7 @@ def read_file(path, kind, names):
     found = {}
 
     def take(path_, entry):
-        name = names.old_data(kind, path_)
+        name = names.present_data(kind, path_)
         if isinstance(entry, h5py.Dataset) and not IGNORED.fullmatch(name):
             found[name] = np.asarray(entry.asstr()[()] if h5py.check_string_dtype(entry.dtype) else entry[()])
 
@@ -42,7 +42,7 @@ def spread_counters(found, names):
         if labels in found and values in found:
             counted = zip(found.pop(labels), np.moveaxis(found.pop(values), -1, 0))
             for label, value in counted:
-                found[f"counter {values.split('/')[0]} {names.old_counter(str(label))}"] = np.asarray(value)
+                found[f"counter {values.split('/')[0]} {names.present_counter(str(label))}"] = np.asarray(value)
 
 
 def read_trajectory(folder, names):
@@ -98,7 +98,7 @@ def read_samples(folder, names):
 
 
 def differences(expected, found, names):
-    """Two lists of sentences: what differs, and what else is to be known; `expected` is that of the base."""
+    """Two lists of sentences: what differs, and what else is to be known; `expected` and `names` are of the base."""
     wrong, notes = [], []
     missing = [name for name in expected if name not in found]
     added = [name for name in found if name not in expected]

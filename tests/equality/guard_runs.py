@@ -8,10 +8,12 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 
-from guard_names import Names
+from guard_cases import NAME, read_entries
+from guard_names import PRESENT, Names
 
 ENVIRONMENT = {
     **{name: value for name, value in os.environ.items() if not name.startswith("OMPI_COMM_WORLD")},
@@ -30,6 +32,10 @@ PATIENCE = 900.0
 
 class GuardError(Exception):
     """The comparison itself cannot be done."""
+
+
+class UnknownError(Exception):
+    """A revision does not have an entry, a word or a namelist of a case."""
 
 
 def call(command, **options):
@@ -57,7 +63,8 @@ class Side:
 
     def program(self, preset, what="program"):
         """The built program without MPI (release) or with it (mpi), or that of the laboratory."""
-        return self.folder / preset / self.names.place(what)
+        path = self.folder / preset / PRESENT.place(what)
+        return path if path.exists() else self.folder / preset / self.names.place(what)
 
     def build(self, say, frozen):
         """Build what is needed; what is `frozen` and was built once is not looked at again."""
@@ -72,23 +79,41 @@ class Side:
             call(["cmake", "--build", self.folder / preset])
             stamp.touch()
 
-    def overrides(self, settings):
-        """Options --set; None if a name was removed."""
-        words = []
+    @cached_property
+    def entries(self):
+        """The words, possibly none, of each entry that this revision knows."""
+        found = {}
+        for entry in read_entries((self.sources / "inputs" / "entries.md").read_text(encoding="utf-8")):
+            found.setdefault(entry.name, set()).update(entry.choices)
+        return found
+
+    def translated(self, settings):
+        """Pairs of entries and values in the names of this revision; a former name only where it lacks the present."""
         for entry, value in settings.items():
-            name, value = self.names.entry(entry), self.names.word(entry, value)
-            if name is None or value is None:
-                return None
-            words += [self.names.option("--set"), f"{name}={value}"]
-        return words
+            pairs = [(entry, value)] if self.lacks(entry, value) is None else self.names.pairs(entry, value)
+            for pair in pairs:
+                lacking = self.lacks(*pair)
+                if lacking is not None:
+                    raise UnknownError(f"no {lacking}")
+                yield pair
+
+    def lacks(self, entry, value):
+        """What this revision does not have of an entry and its value; None: it has both."""
+        group, *instance, key = entry.split(".")
+        words = self.entries.get(f"{group}.{NAME}.{key}" if instance else entry)
+        if words is None:
+            return entry
+        return f"{entry} = {value}" if words and value.strip("'") not in words else None
+
+    def overrides(self, settings):
+        """Options --set."""
+        return [word for name, value in self.translated(settings)
+                for word in (self.names.option("--set"), f"{name}={value}")]
 
     def namelist(self, settings):
-        """The text of a namelist; None if a name was removed."""
+        """The text of a namelist."""
         groups = {}
-        for entry, value in settings.items():
-            name, value = self.names.entry(entry), self.names.word(entry, value)
-            if name is None or value is None:
-                return None
+        for name, value in self.translated(settings):
             group, _, key = name.rpartition(".")
             kind, _, instance = group.partition(".")
             lines = groups.setdefault(group, [f"&{kind}", *([f"   name = '{instance}'"] if instance else [])])
@@ -96,18 +121,16 @@ class Side:
         return "".join("\n".join([*lines, "/\n"]) for lines in groups.values())
 
     def command(self, case, folder):
-        """Arguments of the run of a case, which leaves its result in a folder; None if a name was removed."""
+        """Arguments of the run of a case, which leaves its result in a folder."""
         where = {"output.folder": f"{folder.relative_to(self.work)}/result"}
         if case.source is not None:
             path = self.sources / self.names.place("inputs") / f"{case.source}.nml"
-            words = self.overrides({**case.settings, **where})
-        else:
-            path = folder / "case.nml"
-            text = self.namelist(case.settings)
-            words = text and self.overrides(where)
-            if text:
-                path.write_text(text, encoding="utf-8")
-        return words and ["run", str(path), *words]
+            if not path.exists():
+                raise UnknownError(f"no inputs/{case.source}.nml")
+            return ["run", str(path), *self.overrides({**case.settings, **where})]
+        path = folder / "case.nml"
+        path.write_text(self.namelist(case.settings), encoding="utf-8")
+        return ["run", str(path), *self.overrides(where)]
 
     def start(self, words, ranks=None, threads=1):
         """Start the program, with MPI if there is a number of ranks."""
@@ -125,13 +148,11 @@ class Side:
         return process.returncode, output
 
     def run_case(self, case):
-        """Do a case: the folder of what it left, exit code and output; None if a name was removed."""
+        """Do a case: the folder of what it left, exit code and output."""
         folder = self.work / "cases" / case.name
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         words = self.command(case, folder)
-        if not words:
-            return None
         if case.attempts:
             code, output = self.run_attempts(words, folder / "result", case)
         else:
@@ -139,8 +160,6 @@ class Side:
         if case.replay is None or code != 0:
             return folder / "result", code, output
         finder = self.names.word("--finder", case.replay)
-        if finder is None:
-            return None
         trace = (folder / "result" / self.names.file("trace")).relative_to(self.work)
         code, output = self.run(["replay", str(trace), self.names.option("--finder"), finder,
                                  self.names.option("--samples"), f"{folder.relative_to(self.work)}/samples"],
@@ -191,14 +210,11 @@ def extract(root, revision, folder):
 
 
 def write_bodies(base, present):
-    """The bodies files that inputs/precision wants, made once by the package of the base, renamed for the other."""
-    packages = base.sources / "postproc" / "src"
-    sys.path.insert(0, str(packages))
-    # The base may be older than the package of the laboratory.
-    is_older = (packages / "polydem_post" / "precision_scenes.py").exists()
-    scenes = import_module("polydem_post.precision_scenes" if is_older else "polydem_lab.precision.scenes")
+    """The bodies files that inputs/precision wants, made once by the present package, renamed for the base."""
+    sys.path[:0] = [str(present.sources / "postproc" / "src")]
+    scenes = import_module("polydem_lab.precision.scenes")
     trajectory = import_module("polydem_post").Trajectory
-    folder = base.work / "results" / "workprecision" / "bodies"
+    folder = present.work / "results" / "workprecision" / "bodies"
     folder.mkdir(parents=True, exist_ok=True)
     for name, scene in scenes.SCENES.items():
         path = folder / f"{name}.h5"
@@ -207,22 +223,22 @@ def write_bodies(base, present):
         if scene.bodies is not None:
             scene.bodies().write(path)
         else:
-            source = base.sources / "inputs" / "precision" / f"{name}_start.nml"
-            result = base.work / "results" / f"{name}_start"
-            code, output = base.run(["run", str(source), "--force", "--set", f"output.folder={result}"])
+            source = present.sources / "inputs" / "precision" / f"{name}_start.nml"
+            result = present.work / "results" / f"{name}_start"
+            code, output = present.run(["run", str(source), "--force", "--set", f"output.folder={result}"])
             if code != 0:
                 raise GuardError(f"{source} ended with {code}:\n{output}")
             scenes.last_frame(trajectory(result)).write(path)
-    copies = present.work / "results" / "workprecision" / "bodies"
+    copies = base.work / "results" / "workprecision" / "bodies"
     copies.mkdir(parents=True, exist_ok=True)
     for path in folder.glob("*.h5"):
-        copy_bodies(path, copies / path.name, present.names)
+        copy_bodies(path, copies / path.name, base.names)
 
 
 def copy_bodies(source, target, names):
     """Copy a bodies file under the names of a revision: `data` of the kind bodies."""
     import h5py
 
-    with h5py.File(source, "r") as old, h5py.File(target, "w") as new:
-        for name in old:
-            new[names.new_data(f"bodies/{name}")] = old[name][()]
+    with h5py.File(source, "r") as present, h5py.File(target, "w") as copy:
+        for name in present:
+            copy[names.own_data(f"bodies/{name}")] = present[name][()]

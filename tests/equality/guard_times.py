@@ -13,11 +13,11 @@ GREATEST = 1.01
 def seconds_per_step(side, case):
     """Time of all stages of a run over its number of steps."""
     done = side.run_case(case)
-    if done is None or done[1] != 0:
-        raise GuardError(f"{case.name}: the run of {side.folder.name} failed: {done and done[2][-500:]}")
+    if done[1] != 0:
+        raise GuardError(f"{case.name}: the run of {side.folder.name} failed: {done[2][-500:]}")
     with h5py.File(done[0] / side.names.file("profile"), "r") as file:
-        total = file[side.names.new_data("profile/profile/total")][()]
-        calls = file[side.names.new_data("profile/profile/calls")][()]
+        total = file[side.names.own_data("profile/profile/total")][()]
+        calls = file[side.names.own_data("profile/profile/calls")][()]
     return total.sum() / calls.max()
 
 

@@ -1,6 +1,5 @@
 """Test of the guard: the smallest change of a result is found, names are translated, no entry is forgotten."""
 
-import re
 import sys
 import tempfile
 import unittest
@@ -10,26 +9,11 @@ import guard_python  # first: it finds a Python that has the next two
 import h5py
 import numpy as np
 from guard_cases import UNTRIED, generated_cases, read_entries
-from guard_names import BASE, PRESENT, Names
+from guard_names import PRESENT, Names
 from guard_results import differences, read_result
+from guard_runs import Side, UnknownError
 
 MANUAL = guard_python.ROOT / "inputs" / "entries.md"
-
-
-def in_words_of_base(manual):
-    """The present table of namelist entries with the names of the base revision."""
-    for old, new in PRESENT.entries.items():
-        # Entries of &scene that became a group with a name of its own are in the table for that group already.
-        if new and new.count(".") == 1:
-            (old_group, old_key), (group, key) = old.split("."), new.split(".")
-            manual = manual.replace(f"| &{group} | `{key}` |", f"| &{old_group} | `{old_key}` |")
-            if group == old_group:
-                manual = re.sub(rf"^(\| &{group} \|.*\| ){key} = ", rf"\g<1>{old_key} = ", manual, flags=re.MULTILINE)
-    for old, new in PRESENT.groups.items():
-        manual = manual.replace(f"| &{new} |", f"| &{old} |")
-    for old, new in PRESENT.words.items():
-        manual = manual.replace(new, old.partition("=")[2]) if new else manual
-    return manual
 
 
 def write_result(folder, start=0, change=None, counters=("steps", "contacts"), ledger="ledger"):
@@ -71,13 +55,13 @@ class TestGuard(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
         self.path = Path(self.folder.name)
         write_result(self.path / "base")
-        self.expected = read_result(self.path / "base", BASE)
+        self.expected = read_result(self.path / "base", PRESENT)
 
-    def against(self, names=BASE, whole=True, **changes):
+    def against(self, names=PRESENT, whole=True, **changes):
         """What is said of a changed result."""
         write_result(self.path / "other", **changes)
-        expected = read_result(self.path / "base", BASE, whole)
-        return differences(expected, read_result(self.path / "other", names, whole), names)
+        expected = read_result(self.path / "base", names, whole)
+        return differences(expected, read_result(self.path / "other", PRESENT, whole), names)
 
     def test_the_same_result_is_equal(self):
         self.assertEqual(self.against(), ([], []))
@@ -95,10 +79,10 @@ class TestGuard(unittest.TestCase):
 
     def test_minus_zero_and_the_kind_of_a_nan_are_differences(self):
         for before, after in ((0.0, -0.0), (np.nan, -np.nan)):
-            wrong, _ = differences({"trajectory/x": np.array([before])}, {"trajectory/x": np.array([after])}, BASE)
+            wrong, _ = differences({"trajectory/x": np.array([before])}, {"trajectory/x": np.array([after])}, PRESENT)
             self.assertEqual(len(wrong), 1)
         same = np.array([np.nan])
-        self.assertEqual(differences({"trajectory/x": same}, {"trajectory/x": same.copy()}, BASE)[0], [])
+        self.assertEqual(differences({"trajectory/x": same}, {"trajectory/x": same.copy()}, PRESENT)[0], [])
 
     def test_other_state_hash_counter_and_missing_data_are_found(self):
         def lose(file):
@@ -110,31 +94,39 @@ class TestGuard(unittest.TestCase):
         with self.assertRaises(KeyError):
             self.against(change=lose)
         changed = {**self.expected, "profile/state_hash": np.asarray("0123456789abcdee", dtype=object)}
-        self.assertIn("profile/state_hash", differences(self.expected, changed, BASE)[0][0])
+        self.assertIn("profile/state_hash", differences(self.expected, changed, PRESENT)[0][0])
 
     def test_renamed_data_are_compared_and_removed_ones_are_not(self):
-        names = Names(data={"trajectory/ledger/": "balance/"}, counters={"contacts": "touches"})
+        names = Names(data={"trajectory/balance/": "ledger/"}, counters={"touches": "contacts"})
         self.assertEqual(self.against(names, ledger="balance", counters=("steps", "touches")), ([], []))
         wrong, _ = self.against(names, ledger="balance", counters=("steps", "touches"), start=1)
-        self.assertIn("trajectory/ledger/kinetic", " ".join(wrong))
-        names = Names(data={"trajectory/ledger/": None}, counters={"contacts": None})
+        self.assertIn("trajectory/balance/kinetic", " ".join(wrong))
+        names = Names(removed=frozenset({"trajectory/ledger/", "counter profile contacts"}))
         reduced = {name: value for name, value in self.expected.items() if "ledger" not in name}
         del reduced["counter profile contacts"]
         wrong, notes = differences(self.expected, reduced, names)
         self.assertEqual((wrong, len(notes)), ([], 2))
 
-    def test_renamed_and_removed_entries(self):
-        names = Names(entries={"output.ledger": "output.balance"},
-                      groups={"exchange": "decomposition", "guards": None},
-                      words={"forces.damping=book": "matuttis_chen", "--finder=quadtree_o2": None})
-        self.assertEqual([names.entry(name) for name in ("output.ledger", "exchange.cut", "guards.step", "scene.name")],
-                         ["output.balance", "decomposition.cut", None, "scene.name"])
-        self.assertEqual(names.word("forces.damping", "'book'"), "'matuttis_chen'")
-        self.assertEqual(names.word("forces.damping", "rate"), "rate")
-        self.assertIsNone(names.word("--finder", "quadtree_o2"))
+    def test_renamed_and_divided_entries(self):
+        names = Names(entries={"output.balance": "output.ledger", "scene.corners": ("scene.low", "scene.high")},
+                      words={"forces.damping=matuttis_chen": "book"})
+        self.assertEqual([names.pairs(*pair) for pair in (
+            ("output.balance", ".true."), ("scene.corners", "3, 20"), ("forces.damping", "'matuttis_chen'"),
+            ("forces.damping", "rate"))],
+            [[("output.ledger", ".true.")], [("scene.low", "3"), ("scene.high", "20")],
+             [("forces.damping", "'book'")], [("forces.damping", "rate")]])
+
+    def test_what_the_base_does_not_have_is_said(self):
+        names = Names(entries={"scene.recipe": "scene.name", "forces.stiffness": "forces.hardness"})
+        side = Side(names, guard_python.ROOT, self.path, False)
+        for entry, value in (("wall.one.softness", "1"), ("forces.law", "quadratic"), ("scene.recipe", "box")):
+            with self.assertRaisesRegex(UnknownError, "no (wall.one.softness|forces.law = quadratic|scene.name = box)"):
+                side.overrides({entry: value})
+        self.assertEqual(side.overrides({"wall.one.angle": "3", "scene.recipe": "'drum'", "forces.stiffness": "1e7"}),
+                         ["--set", "wall.one.angle=3", "--set", "scene.name='drum'", "--set", "forces.stiffness=1e7"])
 
     def test_no_entry_and_no_choice_is_forgotten(self):
-        manual = in_words_of_base(MANUAL.read_text(encoding="utf-8"))
+        manual = MANUAL.read_text(encoding="utf-8")
         cases = generated_cases(manual)
         self.assertEqual(len(cases), len({case.name for case in cases}))
         settings = [case.settings for case in cases]
