@@ -32,7 +32,7 @@ ROOT = guard_python.ROOT
 #: Updates of bodies in a shortened run of inputs, and the greatest number of its steps
 WORK, MOST_STEPS = 1_500_000, 4000
 #: Bodies of the groups &stage and &motion
-STAGE, MOTION = (re.compile(rf"^\s*&{group}\b(.*?)^\s*/\s*$", re.MULTILINE | re.DOTALL)
+STAGE, MOTION = (re.compile(rf"^\s*&{group}\b(.*?)/\s*$", re.MULTILINE | re.DOTALL)
                  for group in ("stage", "motion"))
 #: Settings of the bed from which drums are packed: it need not rest, but is looser then
 PATCH = {"integrate.duration": "0.15"}
