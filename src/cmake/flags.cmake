@@ -9,7 +9,7 @@ add_library(polydem::flags ALIAS polydem_flags)
 # these two warnings are off; run-time checks of the Debug build find the real cases.
 #
 target_compile_options(polydem_flags INTERFACE
-  -std=f2008 -fimplicit-none -ffp-contract=off
+  -std=f2008 -fimplicit-none -ffp-contract=off -fno-semantic-interposition
   -Wall -Wextra -Wimplicit-interface -Werror=implicit-interface -Wtrampolines -Werror=trampolines
   -Wno-uninitialized -Wno-maybe-uninitialized
   $<$<CONFIG:Debug>:-Og -g -fcheck=all -fbacktrace -ffpe-trap=invalid,zero,overflow -finit-real=snan>

@@ -53,7 +53,7 @@ contains
       broadcaster%is_reading = .not. run%comm%is_root()
       call serialize_earlier(broadcaster, run%earlier)
       call run%checkpoints%open(run%simulation%settings%checkpoint, run%simulation%dt, run%began, &
-                                merge(run%attempt%limit, 0.0_dp, run%comm%is_root()))
+                                merge(run%attempt%limit, 0.0_dp, run%comm%is_root()), .not. run%attempt%is_guest)
       if (allocated(run%earlier%remark)) call run%log%write_line(run%earlier%remark)
       if (run%earlier%checkpoint == 0_ip) return
       call run%provenance%set('parent', checkpoint_path(run%folder, run%earlier%checkpoint)//', step '// &

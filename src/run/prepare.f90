@@ -50,7 +50,7 @@ contains
    end subroutine build_and_lock
 
    !> Open the log, describe the run, and restore the state of earlier attempts, in a folder that this run has locked.
-   !> Collective; all ranks get the same error.
+   !> Without files only the guards and the intervals of output are prepared. Collective; all ranks get the same error.
    subroutine prepare(settings, force, run, error)
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result
@@ -60,19 +60,22 @@ contains
       !> Allocated if the run cannot start
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%comm%is_root()) then
-         call open_log(settings, force, run, error)
-      else
-         call run%lock%join(run%folder)
+      if (run%attempt%has_files) then
+         if (run%comm%is_root()) then
+            call open_log(settings, force, run, error)
+         else
+            call run%lock%join(run%folder)
+         end if
+         call run%comm%all_reduce_error(error)
+         if (allocated(error)) return
+         call write_overlaps(run, error)
       end if
-      call run%comm%all_reduce_error(error)
-      if (allocated(error)) return
-      call write_overlaps(run, error)
       call new_monitor(run%monitor, run%simulation)
       if (run%comm%is_root()) call warn_of_risks(run%simulation, run%measures, run%log, run%monitor%at_start)
       call choose_intervals(run)
       ! A checkpoint has rows of the series without their columns.
       if (run%series_steps > 0.0_dp .and. .not. allocated(error)) call collect_row(run%simulation)
+      if (.not. run%attempt%has_files) return
       if (.not. allocated(error)) call recall(run, error)
       if (.not. allocated(error) .and. run%comm%is_root()) call finish_restart(run, error)
       call run%comm%all_reduce_error(error)
@@ -119,7 +122,7 @@ contains
                         run%comm%size > 1_ip, run%lock, run%folder_note, run%manifest, error)
       call run%provenance%set('run', run%manifest%run)
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run), &
-         brief=run%attempt%is_brief)
+         brief=run%attempt%is_brief, quiet=run%attempt%is_guest)
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (run%oversubscription /= '') call run%log%write_line(run%oversubscription)

@@ -33,6 +33,12 @@ module polydem_run
       real(dp) :: limit = 0.0_dp
       !> Whether the screen shows nothing but the progress line
       logical :: is_brief = .false.
+      !> Whether there is a result folder; else nothing is written
+      logical :: has_files = .true.
+      !> Whether the run is a guest in a program that has the screen and the signals
+      logical :: is_guest = .false.
+      !> Whether the next step keeps the table of contacts for the host
+      logical :: tabulates = .false.
       !> How the number of threads is determined
       type(thread_choice_t) :: threads
    end type run_options_t
@@ -45,6 +51,10 @@ module polydem_run
       type(run_options_t) :: attempt
       !> Warning if the ranks have more threads than there are processors; else empty
       character(len=:), allocatable :: oversubscription
+      !> Whether steps may be done: the run is prepared, and has not ended
+      logical :: has_begun = .false.
+      !> Step at which this attempt begins
+      integer(lp) :: first_step = 0_lp
       !> Start of the attempt, from `wall_seconds` [s]
       real(dp) :: began = 0.0_dp
       !> State of the result folder after earlier attempts

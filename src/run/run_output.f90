@@ -65,7 +65,8 @@ contains
       type(run_t), intent(in) :: run
 
       associate (s => run%simulation)
-         needs_table = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
+         needs_table = run%attempt%tabulates
+         needs_table = needs_table .or. s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
          if (run%series_steps > 0.0_dp) needs_table = needs_table .or. &
             is_due(s%step + 1_lp, s%n_steps, run%series_steps) .or. is_line_due(run, s%step + 1_lp)
          if (s%stages%number > 0_ip) needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
@@ -131,6 +132,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (run%simulation%step <= max(run%last_frame, run%earlier%last_frame)) return
+      if (.not. run%attempt%has_files) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
          if (allocated(s%traffic)) then

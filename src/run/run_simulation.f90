@@ -15,14 +15,14 @@ module polydem_run_simulation
    use polydem_finish, only: finish
    use polydem_run_output, only: end_step, needs_table, update_balance, write_frame, write_stage
    use polydem_settings, only: settings_t
-   use polydem_begin_run, only: open_output
+   use polydem_begin_run, only: build_start, open_output
    use polydem_start_from, only: return_to_state
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_decomposition, stage_output
    implicit none
    private
-   public :: run_simulation
+   public :: run_simulation, start_run, is_over, take_step, interrupt_run, end_run
 
 contains
 
@@ -38,57 +38,116 @@ contains
       !> Communicator of the run, absent: a serial one. Only its root rank writes files that the ranks do not share
       class(communicator_t), intent(in), optional :: comm
       type(run_t) :: run
+
+      if (present(attempt)) run%attempt = attempt
+      call start_run(settings, force, run, error, comm)
+      do while (.not. (is_over(run) .or. allocated(error)))
+         call take_step(run, error)
+      end do
+      call end_run(run, error)
+   end subroutine run_simulation
+
+   !> Prepare a run up to its first step, and write the first frame unless an earlier attempt wrote it. Nothing is left
+   !> to do if an earlier attempt finished the run. Collective; all ranks get the same error.
+   subroutine start_run(settings, force, run, error, comm)
+      type(settings_t), intent(in) :: settings
+      !> As in `run_simulation`
+      logical, intent(in) :: force
+      !> The run, with its options; `has_begun` says whether there are steps to do, and files to close
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      class(communicator_t), intent(in), optional :: comm
       character(len=:), allocatable :: last_state
 
       run%began = wall_seconds()
-      if (present(attempt)) run%attempt = attempt
       call choose_communicator(run%comm, comm)
       run%folder = result_folder(settings)
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
       call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error)) call build_and_lock(settings, force, run, error)
+      if (.not. allocated(error) .and. run%attempt%has_files) call build_and_lock(settings, force, run, error)
+      if (.not. allocated(error) .and. .not. run%attempt%has_files) call build_start(settings, run, error)
       if (.not. allocated(error)) then
          run%oversubscription = oversubscription(run%comm)
          call prepare(settings, force, run, error)
       end if
-      if (.not. allocated(error)) call open_output(run, error)
-      if (.not. allocated(error)) call run_steps(run, error)
-      call run%lock%release()
-   end subroutine run_simulation
+      if (.not. allocated(error) .and. run%attempt%has_files) call open_output(run, error)
+      if (allocated(error)) return
+      run%has_begun = .true.
+      call begin_steps(run, error)
+   end subroutine start_run
 
-   !> Write the first frame unless an earlier attempt wrote it, run all steps, and end the run; collective.
-   subroutine run_steps(run, error)
+   !> Write the stage and, unless an earlier attempt wrote it, the first frame; collective.
+   subroutine begin_steps(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
-      logical :: begins, is_due, must_stop
-      integer(lp) :: first
+      logical :: begins
 
       if (run%earlier%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
       call write_stage(run)
-      first = run%simulation%step
-      if (run%earlier%checkpoint == 0_ip) then
-         call end_step(run, error)
-         if (.not. allocated(error)) call return_to_state(run%simulation, error)
+      run%first_step = run%simulation%step
+      if (run%earlier%checkpoint > 0_ip) return
+      call end_step(run, error)
+      if (.not. allocated(error)) call return_to_state(run%simulation, error)
+   end subroutine begin_steps
+
+   !> Whether all steps of a run are done
+   pure logical function is_over(run)
+      type(run_t), intent(in) :: run
+
+      is_over = .not. run%has_begun .or. run%simulation%step >= run%simulation%n_steps
+   end function is_over
+
+   !> Do a step, and write what is due after it; collective. Another stage may begin.
+   subroutine take_step(run, error)
+      !> A run that is not over
+      type(run_t), intent(inout) :: run
+      !> Allocated if the run must stop
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: is_due, must_stop
+
+      call advance(run%simulation, error, needs_table(run))
+      call synchronise_ranks(run, is_due, must_stop, error)
+      if (.not. allocated(error)) call end_step(run, error)
+      call run%simulation%timers%lap(stage_output)
+      call run%simulation%timers%end_step()
+      if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
+      if (run%simulation%stages%number > 0_ip .and. .not. allocated(error)) call change_stage(run, error)
+      if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
+   end subroutine take_step
+
+   !> End a run, also after an error or before all steps are done: write its end, and release the folder; collective.
+   subroutine end_run(run, error)
+      type(run_t), intent(inout) :: run
+      !> On entry the reason why the run did not finish
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (run%has_begun .and. run%attempt%has_files) then
+         call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
+         ! The result is complete without it. Before its first step a continued run has no pairs that it could write;
+         ! the checkpoint from which it came is that of its end.
+         if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) then
+            if (run%simulation%step > run%first_step .or. run%earlier%checkpoint == 0_ip) &
+               call write_checkpoint(run, error)
+         end if
+         call run%comm%all_reduce_error(error)
       end if
-      do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
-         call advance(run%simulation, error, needs_table(run))
-         call synchronise_ranks(run, is_due, must_stop, error)
-         if (.not. allocated(error)) call end_step(run, error)
-         call run%simulation%timers%lap(stage_output)
-         call run%simulation%timers%end_step()
-         if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
-         if (run%simulation%stages%number > 0_ip .and. .not. allocated(error)) call change_stage(run, error)
-         if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
-      end do
-      call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
-      ! The result is complete without it. Before its first step a continued run has no pairs that it could write; the
-      ! checkpoint from which it came is that of its end.
-      if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) then
-         if (run%simulation%step > first .or. run%earlier%checkpoint == 0_ip) call write_checkpoint(run, error)
-      end if
-      call run%comm%all_reduce_error(error)
-   end subroutine run_steps
+      run%has_begun = .false.
+      call run%lock%release()
+   end subroutine end_run
+
+   !> Interrupt a run between two steps, so that --continue resumes it; collective. Nothing happens if it is over.
+   subroutine interrupt_run(run, reason, error)
+      type(run_t), intent(inout) :: run
+      !> What interrupts it, for its log
+      character(len=*), intent(in) :: reason
+      !> Becomes `stopped_early`, or why the checkpoint cannot be written
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (is_over(run)) return
+      run%reason = reason
+      call write_due_checkpoint(run, run%checkpoints%last_step /= run%simulation%step, .true., error)
+   end subroutine interrupt_run
 
    !> All-reduce the error of a step, and broadcast whether a checkpoint is due and whether the run must end, which the
    !> root rank decides from its clock and signals; collective.
@@ -100,7 +159,8 @@ contains
       integer(lp) :: flags(3 + most_guards)
 
       is_due = .false.
-      if (run%comm%is_root()) call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
+      if (run%comm%is_root() .and. run%attempt%has_files) &
+         call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
       must_stop = allocated(run%reason)
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
@@ -140,7 +200,7 @@ contains
       logical :: begins
 
       call decide_end(run%simulation)
-      if (is_at_limit(run%simulation)) then
+      if (is_at_limit(run%simulation) .and. run%attempt%has_files) then
          call update_balance(run)
          call write_frame(run, error)
          if (.not. allocated(error)) call write_checkpoint(run, error)

@@ -43,6 +43,8 @@ module polydem_checkpoint_schedule
       real(dp), private :: last_time = 0.0_dp
       !> Time at which the attempt should end [s]
       real(dp), private :: deadline = huge(1.0_dp)
+      !> Whether signals end the run
+      logical, private :: heeds_signals = .true.
       !> Time of the last call of `decide`, and of the next poll for signals [s]
       real(dp), private :: last_check = 0.0_dp, next_poll = 0.0_dp
    contains
@@ -60,7 +62,7 @@ module polydem_checkpoint_schedule
 contains
 
    !> Start the schedule of a run.
-   subroutine open_checkpoints(self, settings, dt, began, limit)
+   subroutine open_checkpoints(self, settings, dt, began, limit, heeds_signals)
       class(checkpoints_t), intent(inout) :: self
       !> Settings of the group &checkpoint
       type(checkpoint_settings_t), intent(in) :: settings
@@ -70,14 +72,17 @@ contains
       real(dp), intent(in) :: began
       !> Limit of the elapsed time of the attempt [s]; 0: no limit
       real(dp), intent(in) :: limit
+      !> Whether signals end the run
+      logical, intent(in) :: heeds_signals
 
+      self%heeds_signals = heeds_signals
       self%steps(1) = int(settings%steps, lp)
       if (settings%interval > 0.0_wp) self%steps(2) = max(1_lp, nint(min(settings%interval/dt, 1.0e15_wp), lp))
       if (settings%wall_interval > 0.0_wp) self%interval = real(settings%wall_interval, dp)
       if (limit > 0.0_dp) self%deadline = began + used_fraction*limit
       self%last_time = began
       self%last_check = wall_seconds()
-      call await_signals()
+      if (heeds_signals) call await_signals()
    end subroutine open_checkpoints
 
    !> Decide at the end of a step whether a checkpoint is due, and whether the run must end after it.
@@ -98,7 +103,7 @@ contains
       do k = 1, size(self%steps)
          if (self%steps(k) > 0_lp) is_due = is_due .or. mod(step, self%steps(k)) == 0_lp
       end do
-      if (now >= self%next_poll) then
+      if (self%heeds_signals .and. now >= self%next_poll) then
          signal = caught_signal()
          if (signal /= '') reason = 'SIG'//signal
          self%next_poll = now + poll_interval
@@ -185,7 +190,7 @@ contains
       class(checkpoints_t), intent(inout) :: self
       type(log_t), intent(inout) :: log
 
-      call release_signals()
+      if (self%heeds_signals) call release_signals()
       if (self%n > 0_ip) call log%write_line('checkpoints: '//to_text(self%n)//', '// &
          decimal(1.0e3_dp*(self%seconds/real(self%n, dp)), 1)//' ms each, at most '// &
          decimal(1.0e3_dp*self%longest, 1)//' ms')

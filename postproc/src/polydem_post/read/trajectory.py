@@ -370,7 +370,7 @@ class Trajectory:
             bodies = {**bodies, "cell_low": frames["cell_low"][row], "cell_size": frames["cell_size"][row]}
         kept = rows.kept(row, bodies["id"])
         if kept is not None:
-            bodies = _chosen(kept, bodies)
+            bodies = chosen_bodies(kept, bodies)
         crossed = [name for name in ("image", "slid") if name in frames]
         columns = {name: rows.column(name, row) for name in (*GROWING, *crossed)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
@@ -465,10 +465,10 @@ def _without(gone: Any, columns: dict[str, Any], bodies: dict[str, Any]) -> tupl
     kept = ~np.isin(bodies["id"], gone)
     if kept.all():
         return columns, bodies
-    return {name: values[kept] for name, values in columns.items()}, _chosen(kept, bodies)
+    return {name: values[kept] for name, values in columns.items()}, chosen_bodies(kept, bodies)
 
 
-def _chosen(kept: npt.NDArray[np.bool_], bodies: dict[str, Any]) -> dict[str, Any]:
+def chosen_bodies(kept: npt.NDArray[np.bool_], bodies: dict[str, Any]) -> dict[str, Any]:
     """Columns of some bodies."""
     corners = np.diff(bodies["vertex_start"])
     start = np.concatenate([[0], np.cumsum(corners[kept])]).astype(bodies["vertex_start"].dtype)

@@ -1,0 +1,325 @@
+"""A simulation that is advanced step by step."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Mapping
+from ctypes import byref, c_char_p, c_void_p
+from os import PathLike, fspath
+from types import MappingProxyType, TracebackType
+from typing import Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import InputError
+from .library import Handle, call, load
+from .live import LiveSource, live_frame
+from .namelist import override, write_namelist
+
+#: Elapsed time of a call of the library, after which Python looks for Ctrl-C [s]
+PATIENCE = 0.1
+#: What becomes of a result that is in the folder, as in polydem.h
+NEW, FORCE, CONTINUE = 0, 1, 2
+#: Columns of the bodies, by the names of a `polydem_post` frame
+BODY_COLUMNS = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "mass", "inertia", "material",
+                "image", "vertex_start", "force", "torque")
+#: Columns of the contacts, likewise
+CONTACT_COLUMNS = ("first", "second", "area", "point", "normal", "length", "force", "couple")
+
+Observer = Callable[["Simulation"], Any]
+
+
+class Columns:
+    """Columns of bodies or contacts, in ascending order of identifiers; each is copied when it is asked for."""
+
+    def __init__(self, simulation: Simulation, group: str, names: tuple[str, ...]):
+        self._simulation, self._group, self._names = simulation, group, names
+
+    def __getattr__(self, name: str) -> npt.NDArray[Any]:
+        if name.startswith("_") or name not in self._names:
+            raise AttributeError(f"{self._group} have no column {name}, but {', '.join(self._names)}")
+        found = self._simulation._handle.array(f"{self._group}/{name}")
+        if found is None:
+            raise AttributeError(f"the {self._group} of this simulation have no column {name}")
+        return found.astype(bool) if name == "fixed" else found
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._names]
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return self._simulation._handle.integer(self._group)
+
+
+class Wall:
+    """A group &wall: its bodies, and the force and torque on it."""
+
+    def __init__(self, simulation: Simulation, name: str, ids: npt.NDArray[np.int64]):
+        self._simulation, self.name, self.id = simulation, name, ids
+
+    def _rows(self) -> npt.NDArray[np.intp]:
+        return np.searchsorted(self._simulation.bodies.id, self.id)
+
+    @property
+    def position(self) -> npt.NDArray[np.float64]:
+        """Mean of the centres of its bodies, (2) [m]."""
+        return np.asarray(self._simulation.bodies.position[self._rows()].mean(axis=0))
+
+    @property
+    def force(self) -> npt.NDArray[np.float64]:
+        """Force of the other bodies on it in this step, (2) [N/m]."""
+        return np.asarray(self._simulation.bodies.force[self._rows()].sum(axis=0))
+
+
+class Snapshot:
+    """A state of a simulation, to which it can return as often as wanted."""
+
+    def __init__(self, pointer: int):
+        self._pointer = c_void_p(pointer)
+
+    def __del__(self) -> None:
+        if self._pointer:
+            load().polydem_delete_snapshot(byref(self._pointer))
+
+
+class Simulation:
+    """A simulation in this process.
+
+        source     path of a namelist, its text, or a dictionary {"forces": {"gravity": (0, -9.81)}, ...}
+        overrides  {"forces.friction_coefficient": 0.4, ...}
+        threads    number of OpenMP threads
+        folder     folder of the result, which is that of `polydem run`; None: nothing is written
+        force, resume  whether a result in the folder is replaced, or continued
+
+    Use it in a `with` statement, or call `close`. A simulation with a folder that is closed before its end is
+    interrupted and can be resumed. Values are copies. One thread at a time may use a simulation.
+    """
+
+    def __init__(self, source: Union[str, PathLike[str], Mapping[str, Any]],
+                 overrides: Optional[Mapping[str, Any]] = None, *, threads: int = 1,
+                 folder: Union[str, PathLike[str], None] = None, force: bool = False, resume: bool = False):
+        self._observers: list[tuple[int, Observer]] = []
+        self._stop: Optional[str] = None
+        if force and resume:
+            raise InputError("force starts the run again, resume goes on with it: choose one")
+        if (force or resume) and folder is None:
+            raise InputError("force and resume need a folder")
+        words = [override(entry, value).encode() for entry, value in (overrides or {}).items()]
+        file, text = _name_and_text(source)
+        pointer = call("new_simulation", file.encode(), None if text is None else text.encode(), len(words),
+                       (c_char_p * len(words))(*words), None if folder is None else fspath(folder).encode(),
+                       CONTINUE if resume else FORCE if force else NEW, int(threads))
+        self._handle = Handle(pointer)
+
+    # --- life ---------------------------------------------------------------------------------------------------------
+
+    def __enter__(self) -> Simulation:
+        """The simulation."""
+        return self
+
+    def __exit__(self, kind: Optional[type[BaseException]], error: Optional[BaseException],
+                 trace: Optional[TracebackType]) -> None:
+        """Close it."""
+        self.close()
+
+    def __del__(self) -> None:
+        if hasattr(self, "_handle"):
+            self.close()
+
+    def __repr__(self) -> str:
+        """Time, step and bodies."""
+        if self._handle.pointer is None:
+            return "<Simulation: closed>"
+        return (f"<Simulation: t = {self.time:.6g} s, step {self.step} of {self.n_steps}, {len(self.bodies)} bodies, "
+                f"{len(self.contacts)} contacts>")
+
+    def close(self) -> None:
+        """End the run, complete its files and free its memory; a second call does nothing."""
+        self._handle.close()
+
+    # --- steps --------------------------------------------------------------------------------------------------------
+
+    def run(self, steps: Optional[int] = None, *, until: Optional[float] = None,
+            duration: Optional[float] = None) -> int:
+        """Run through all stages; return the number of steps done.
+
+        Without arguments to the end of the run; else `steps` steps, `duration` seconds of simulated time from now, or
+        up to the first step that is not before the time `until`. Ctrl-C, and an exception of an observer, end it
+        between two steps in a good state.
+        """
+        if sum(each is not None for each in (steps, until, duration)) > 1:
+            raise InputError("give one of steps, until and duration")
+        begin, dt = self.step, self.dt
+        end = None
+        if steps is not None:
+            if steps != int(steps) or steps < 0:
+                raise InputError(f"steps must be a whole number, not {steps}")
+            end = begin + int(steps)
+        elif until is not None or duration is not None:
+            time = float(until) if until is not None else self.time + float(duration or 0.0)
+            if not math.isfinite(time):
+                raise InputError("the time at which to stop must be finite")
+            # Rounding does not make a whole number of steps one step longer.
+            end = max(begin, math.ceil(time / dt * (1.0 - 1e-12)))
+        self._stop = None
+        while self._stop is None and not self.is_over and (end is None or self.step < end):
+            self._advance_to(end)
+        return self.step - begin
+
+    def _advance_to(self, end: Optional[int]) -> None:
+        """Advance to the next call of an observer, or to a step, at most for a moment; call what is due."""
+        now = self.step
+        last = self.n_steps if end is None else min(end, self.n_steps)
+        for interval, _ in self._observers:
+            last = min(last, (now // interval + 1) * interval)
+        call("advance", self._handle.open, max(1, last - now), PATIENCE)
+        step = self.step
+        for interval, observer in list(self._observers):
+            if step % interval == 0 and step > now:
+                observer(self)
+
+    def every(self, steps: Optional[int] = None, *, seconds: Optional[float] = None) -> Callable[[Observer], Observer]:
+        """A decorator: call a function with the simulation after each step whose number is a multiple.
+
+        `seconds` is rounded to a whole number of steps.
+        """
+        if (steps is None) == (seconds is None):
+            raise InputError("give one of steps and seconds")
+        interval = int(steps) if steps is not None else max(1, round(float(seconds or 0.0) / self.dt))
+        if interval < 1:
+            raise InputError(f"an interval has at least one step, not {interval}")
+
+        def add(observer: Observer) -> Observer:
+            self._observers.append((interval, observer))
+            return observer
+
+        return add
+
+    def stop(self, reason: str = "stopped") -> None:
+        """Let `run` return after the present step; `stopped` has the reason."""
+        self._stop = str(reason)
+
+    @property
+    def stopped(self) -> Optional[str]:
+        """Why the last `run` returned early; None: it did not."""
+        return self._stop
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._handle.real("time")
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return self._handle.real("dt")
+
+    @property
+    def step(self) -> int:
+        """Number of steps done."""
+        return self._handle.integer("step")
+
+    @property
+    def n_steps(self) -> int:
+        """Number of steps of the whole run; with stages the greatest possible one."""
+        return self._handle.integer("n_steps")
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all steps are done."""
+        return self._handle.integer("is_over") == 1
+
+    @property
+    def stage(self) -> str:
+        """Name of the present stage; empty: there are none."""
+        return self._handle.text("stage")
+
+    @property
+    def state_hash(self) -> str:
+        """Hash of the bits of all bodies, 16 hexadecimal digits."""
+        return self._handle.text("state_hash")
+
+    @property
+    def settings(self) -> Any:
+        """The settings with all defaults, as of a `polydem_post` trajectory."""
+        from polydem_post import Settings
+
+        return Settings(self._handle.text("settings"))
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """The energy and momentum balance of this step by name [J/m, N s/m, N s]; empty if it is switched off."""
+        values = self._handle.array("energy/value")
+        return {} if values is None else dict(zip(self._names("energy"), map(float, values)))
+
+    @property
+    def series(self) -> dict[str, npt.NDArray[Any]]:
+        """Rows of the series by name, with `step` and `time`; with a folder, those that no file has yet."""
+        step, time = self._handle.array("series/step"), self._handle.array("series/time")
+        values = self._handle.array("series/value")
+        if step is None or time is None or values is None:
+            return {}
+        values = values.reshape(len(step), -1)
+        return {"step": step, "time": time, **dict(zip(self._names("series"), values.T))}
+
+    def _names(self, table: str) -> list[str]:
+        return [line.split("\t")[0] for line in self._handle.text(table).splitlines()]
+
+    @property
+    def bodies(self) -> Columns:
+        """Columns of the bodies, with the names and units of a `polydem_post` frame."""
+        return Columns(self, "bodies", BODY_COLUMNS)
+
+    @property
+    def contacts(self) -> Columns:
+        """Columns of the contacts, likewise."""
+        return Columns(self, "contacts", CONTACT_COLUMNS)
+
+    @property
+    def walls(self) -> Mapping[str, Wall]:
+        """The walls by name."""
+        return MappingProxyType({name: Wall(self, name, ids) for name, ids in _walls(self._handle.text("walls"))})
+
+    def frame(self) -> Any:
+        """The present state as a `polydem_post` frame, for every measure and picture."""
+        return live_frame(self._handle, self.settings, LiveSource(self._handle))
+
+    # --- states -------------------------------------------------------------------------------------------------------
+
+    def snapshot(self) -> Snapshot:
+        """The present state."""
+        return Snapshot(call("new_snapshot", self._handle.open))
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a state, of this simulation or of one with the same settings; what follows has the same bits."""
+        call("restore", self._handle.open, snapshot._pointer)
+
+    def copy(self) -> Simulation:
+        """Another simulation, without a folder and without observers, that goes on from this state."""
+        other = Simulation.__new__(Simulation)
+        other._observers, other._stop = [], None
+        other._handle = Handle(call("copy_simulation", self._handle.open))
+        return other
+
+
+def _name_and_text(source: Union[str, PathLike[str], Mapping[str, Any]]) -> tuple[str, Optional[str]]:
+    """Path and no text of a namelist, or its name in messages and its text."""
+    if isinstance(source, Mapping):
+        return "dictionary", write_namelist(source)
+    name = fspath(source)
+    return ("text", name) if isinstance(source, str) and "&" in name else (name, None)
+
+
+def _walls(text: str) -> list[tuple[str, npt.NDArray[np.int64]]]:
+    """Names and identifiers of the bodies of the walls: 'floor 101-103; lid 104 107'."""
+    found = []
+    for wall in filter(None, text.split("; ")):
+        name, *ranges = wall.split()
+        ids = [np.arange(int(low), int(high or low) + 1)
+               for low, _, high in (each.partition("-") for each in ranges)]
+        found.append((name, np.concatenate(ids) if ids else np.empty(0, dtype=np.int64)))
+    return found
