@@ -8,12 +8,13 @@ PAGE = Path(__file__).with_name("README.md")
 
 
 def read_table(name):
-    """Rows of a table of the page: the capabilities of its first column, and the words of the second."""
+    """The table of a page: capabilities of its first column, several `in ticks` each a row, and words of the second."""
     table = PAGE.read_text(encoding="utf-8").split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
-    rows = re.findall(r"^\| `([\w +]+)` \| ([\w, ]+) \| .+ \|$", table, re.MULTILINE)
+    rows = re.findall(r"^\| (`[\w +]+`(?:, `[\w +]+`)*) \| ([\w, ]+) \| .+ \|$", table, re.MULTILINE)
     if len(rows) != table.count("\n|") - 2:
         raise ValueError(f"README.md: the table of {name} was not understood")
-    return [(frozenset(tags.split(" + ")), word) for tags, words in rows for word in words.split(", ")]
+    return [(frozenset(tags.split(" + ")), word) for cell, words in rows
+            for tags in re.findall(r"`([^`]+)`", cell) for word in words.split(", ")]
 
 
 def impossible_pairs():

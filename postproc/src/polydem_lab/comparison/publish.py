@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from math import exp, log
 from pathlib import Path
+from textwrap import wrap
 
 from polydem_post.base.result_file import ResultError, cannot_write
 
@@ -75,10 +76,9 @@ def written(contents: Contents, mode: str) -> str:
         if drawing.name == FIRST_FIGURE:
             continue
         lines += [f"![{drawing.name}]({drawing.name}.png)", "", drawing.caption, ""]
-    lines += ["## Tables", "", f"The folder [{TABLES}]({TABLES}) holds all tables as comma-separated values:", "",
-              "| file | contents |", "|---|---|"]
-    lines += [f"| [{table.name}.csv]({TABLES}/{table.name}.csv) | {table.title} |"
-              for table in sorted(_here(contents.tables), key=lambda each: each.name)]
+    links = ", ".join(f"[{table.name}]({TABLES}/{table.name}.csv)"
+                      for table in sorted(_here(contents.tables), key=lambda each: each.name))
+    lines += ["## Tables", "", *wrap(f"All tables as comma-separated values: {links}.", 120, break_long_words=False)]
     return "\n".join(lines) + "\n"
 
 

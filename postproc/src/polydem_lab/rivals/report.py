@@ -12,8 +12,8 @@ from ..report.files import write_figures, write_tables
 from .points import Comparison, read_comparison
 from .tables import all_tables
 
-#: Tables that are too long for the page
-NOT_ON_THE_PAGE = ("rivals_points", "rivals_seeds")
+#: Tables that are too long for the page, which links to them
+NOT_ON_THE_PAGE = ("rivals_cheapest", "rivals_stiffness", "rivals_collective", "rivals_points", "rivals_seeds")
 
 #: Name of the page in a report, and of the one that is published; the figures that are
 PAGE, PUBLISHED = "rivals.md", "tables.md"
@@ -33,7 +33,9 @@ def write_rivals_report(folder: Path, figures: bool = True) -> list[Path]:
             written += write_figures(rivals_drawings(found, folder), output / "figures")
         page = output / PAGE
         shown = [table.document("markdown") for table in tables if table.name not in NOT_ON_THE_PAGE]
-        page.write_text("# Tables of speed against error beside other codes\n\n`./polydem rivals` made this page.\n\n"
+        page.write_text("# Tables of speed against error beside other codes\n\n`./polydem rivals` made this page. The "
+                        "folder [tables](tables) has all tables, also times for an error, errors over stiffness, "
+                        "means over\nseeds, and every point.\n\n"
                         + "\n".join(shown).replace("\n### ", "\n## ").replace("### ", "## ", 1), encoding="utf-8")
     except OSError as error:
         raise cannot_write(output, error) from error
