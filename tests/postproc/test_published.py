@@ -17,7 +17,6 @@ ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 #: Pages with numbers that a run of the program made, and files beside tables that have no room for words
 PAGES = [
     "inputs/beverloo.md",
-    "inputs/bench/README.md",
     "inputs/biaxial.md",
     "inputs/performance.md",
     "postproc/verdicts/README.md",
@@ -36,6 +35,7 @@ OTHERS = {
     "README.md",
     "inputs/README.md",
     "inputs/accuracy.md",
+    "inputs/bench/README.md",
     "inputs/bench/entries.md",
     "inputs/checks.md",
     "inputs/entries.md",
