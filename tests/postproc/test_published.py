@@ -58,7 +58,6 @@ OTHERS = {
     "tests/faults.md",
     "tests/hard_cases.md",
     "tests/invariances/README.md",
-    "tests/verification/reference/README.md",
 }
 
 @pytest.mark.parametrize("page", PAGES)

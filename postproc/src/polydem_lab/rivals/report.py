@@ -13,7 +13,8 @@ from .points import Comparison, read_comparison
 from .tables import all_tables
 
 #: Tables that are too long for the page, which links to them
-NOT_ON_THE_PAGE = ("rivals_cheapest", "rivals_stiffness", "rivals_collective", "rivals_points", "rivals_seeds")
+NOT_ON_THE_PAGE = ("rivals_cheapest", "rivals_stiffness", "rivals_collective", "rivals_spread", "rivals_points",
+                   "rivals_seeds")
 
 #: Name of the page in a report, and of the one that is published; the figures that are
 PAGE, PUBLISHED = "rivals.md", "tables.md"
