@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from polydem_post.base.result_file import cannot_write
@@ -33,10 +34,11 @@ def write_rivals_report(folder: Path, figures: bool = True) -> list[Path]:
 
             written += write_figures(rivals_drawings(found, folder), output / "figures")
         page = output / PAGE
-        shown = [table.document("markdown") for table in tables if table.name not in NOT_ON_THE_PAGE]
+        shown = [replace(table, origin="").document("markdown") for table in tables
+                 if table.name not in NOT_ON_THE_PAGE]
         page.write_text("# Tables of speed against error beside other codes\n\n`./polydem rivals` made this page. The "
                         "folder [tables](tables) has all tables, also times for an error, errors over stiffness, "
-                        "means over\nseeds, and every point.\n\n"
+                        f"means over\nseeds, and every point. {origin}\n\n"
                         + "\n".join(shown).replace("\n### ", "\n## ").replace("### ", "## ", 1), encoding="utf-8")
     except OSError as error:
         raise cannot_write(output, error) from error

@@ -30,8 +30,8 @@ NONE = "-"
 
 def all_tables(found: Comparison, folder: Path) -> list[Table]:
     """Every table of a report that has rows."""
-    tables = [ratios(found), cheapest(found), least(found), stiffness(found), profile(found), collective(found), body_steps(found),
-              spread(found), left_out(found, folder), seeds(found), points(found)]
+    tables = [ratios(found), cheapest(found), least(found), stiffness(found), profile(found), collective(found),
+              body_steps(found), spread(found), left_out(found, folder), seeds(found), points(found)]
     return [table for table in tables if table.rows]
 
 
@@ -191,8 +191,11 @@ def left_out(found: Comparison, folder: Path) -> Table:
                 omitted.setdefault(why, []).append(problem)
         for why, names in omitted.items():
             table.add(module.NAME, ", ".join(names), why)
+    failed: dict = {}
     for sample in found.failures():
-        table.add(sample.series, f"{sample.problem}, level {sample.level}", sample.message)
+        failed.setdefault((sample.series, sample.problem, sample.message), []).append(f"{sample.level}")
+    for (series, problem, message), levels in failed.items():
+        table.add(series, f"{problem}, level {', '.join(dict.fromkeys(levels))}", message)
     return table
 
 
