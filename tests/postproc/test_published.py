@@ -39,7 +39,6 @@ OTHERS = {
     "inputs/bench/entries.md",
     "inputs/checks.md",
     "inputs/entries.md",
-    "inputs/getting_started.md",
     "inputs/glossary.md",
     "inputs/how_to.md",
     "inputs/log.md",
