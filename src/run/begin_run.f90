@@ -59,7 +59,7 @@ contains
       call run%provenance%set('parent', checkpoint_path(run%folder, run%earlier%checkpoint)//', step '// &
                               to_text(run%earlier%step))
       call restore(run%folder, run%earlier, run%provenance%text_of('revision'), run%simulation, run%attempts, &
-                   run%monitor, run%log, error)
+                   run%log, error)
       if (allocated(error)) return
       run%checkpoints%last_step = run%earlier%step
       run%checkpoints%next = modulo(run%earlier%checkpoint, n_checkpoints) + 1_ip

@@ -3,7 +3,7 @@ module polydem_check
    use polydem_initial_warnings, only: warn_of_risks
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t
-   use polydem_motion_check, only: check_motion
+   use polydem_guard, only: respond_to_motion
    use polydem_host, only: resident_memory
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
@@ -91,8 +91,7 @@ contains
       call new_monitor(monitor, simulation)
       call warn_of_risks(simulation, measures, log, monitor%at_start)
       ! A body that is too fast at the start moves too far in the first step.
-      call check_motion(simulation%motion%check, simulation%bodies, simulation%moving(:simulation%n_moving), &
-                        simulation%step, simulation%dt, error)
+      call respond_to_motion(simulation, error)
       call check_step(monitor, simulation, .true., log, error)
       if (.not. allocated(error)) call return_to_state(simulation, error)
       if (.not. allocated(error)) call advance(simulation, error)

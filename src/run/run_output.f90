@@ -69,7 +69,7 @@ contains
          if (run%series_steps > 0.0_dp) needs_table = needs_table .or. &
             is_due(s%step + 1_lp, s%n_steps, run%series_steps) .or. is_line_due(run, s%step + 1_lp)
          if (s%stages%number > 0_ip) needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
-         needs_table = needs_table .or. needs_contacts(run%monitor, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
+         needs_table = needs_table .or. needs_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
    end function needs_table
 

@@ -105,12 +105,12 @@ contains
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
       flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), &
-               merge(1_lp, 0_lp, asks_all(run%monitor, run%simulation)), warning_counts(run%monitor)]
+               merge(1_lp, 0_lp, asks_all(run%simulation)), warning_counts(run%simulation)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
       run%monitor%is_asked = flags(3) == 1_lp
-      call set_warning_counts(run%monitor, flags(4:))
+      call set_warning_counts(run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 
@@ -159,14 +159,14 @@ contains
       associate (s => run%simulation)
          call s%timers%start()
          ! A checkpoint holds the number of warnings, not their text.
-         call report_pending_warnings(run%monitor, s, run%log)
+         call report_pending_warnings(s, run%log)
          ! The frames up to the checkpoint are on disk before the checkpoint is.
          call run%trajectory%close(error, run%manifest)
          if (allocated(error)) return
          attempts = run%attempts
          attempts%segments = int(run%trajectory%number, lp)
          attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
-         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, run%monitor, error)
+         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, error)
          call s%timers%add_to_total(stage_output)
       end associate
    end subroutine write_checkpoint

@@ -12,7 +12,8 @@ module polydem_time_step
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_list, only: pair_list_t
-   use polydem_participants, only: begin_step, change_bodies, end_step, follow_forces, need_all_ranks, need_table
+   use polydem_participants, only: begin_step, change_bodies, check_contacts, end_step, follow_forces, &
+      need_all_ranks, need_table
    use polydem_predict, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
@@ -68,6 +69,7 @@ contains
          call timers%lap(stage_neighbours)
          call loop_over_contacts(self, self%dt, needs_table(self, tabulate), clock, error)
          call timers%divide_lap(stage_overlap, stage_forces, clock)
+         call check_contacts(self, error)
          call add_other_forces(self, error)
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
@@ -162,6 +164,7 @@ contains
 
       call find_pairs(self, error)
       call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, error)
+      call check_contacts(self, error)
       call add_other_forces(self, error)
       if (allocated(error)) return
       call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
@@ -189,6 +192,7 @@ contains
          if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
          call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
          call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
+         call check_contacts(self, known_error)
          call add_other_forces(self, known_error)
       end if
       call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)

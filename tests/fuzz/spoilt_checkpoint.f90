@@ -52,7 +52,7 @@ contains
       if (allocated(error)) error stop 'fuzz: the run of the checkpoint fails'
       allocate (serializer%fields(0))
       attempts%scene = any_hash
-      call serialize_run(serializer, simulation, attempts, monitor)
+      call serialize_run(serializer, simulation, attempts)
       call move_alloc(serializer%fields, fields)
    end function sound_checkpoint
 
@@ -87,7 +87,7 @@ contains
       attempts%scene = any_hash
       call file%open(path, error)
       if (allocated(error)) return
-      call serialize_run(file, simulation, attempts, monitor)
+      call serialize_run(file, simulation, attempts)
       call file%close(error)
       if (allocated(error)) error%message = path//' does not fit this run: '//error%message
       call do_steps(simulation, steps_after, error)

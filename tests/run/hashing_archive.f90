@@ -31,7 +31,7 @@ contains
       type(monitor_t) :: monitor
 
       call new_monitor(monitor, simulation)
-      call serialize_run(serializer, simulation, attempts, monitor)
+      call serialize_run(serializer, simulation, attempts)
       hash = serializer%hash
    end function hash_of_everything
 

@@ -6,7 +6,7 @@ module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse, two_pi
    use polydem_entry_warnings, only: warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
-   use polydem_motion_check, only: shorter_step
+   use polydem_guard, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_parts, only: parts_t

@@ -14,7 +14,7 @@ module polydem_checkpoint_fields
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_monitor, only: serialize_monitor, monitor_t
+   use polydem_monitor, only: serialize_guards
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_packed_state, only: find_walls
    use polydem_participants, only: serialize_participants
@@ -45,17 +45,16 @@ module polydem_checkpoint_fields
 contains
 
    !> Write the state of a run to a serializer, or restore it from there.
-   subroutine serialize_run(serializer, simulation, attempts, monitor)
+   subroutine serialize_run(serializer, simulation, attempts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Written: the simulation at the end of a step. Restored: on entry any state of the same scene, on return the
       !> stored state without contacts, which the next step computes
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
-      type(monitor_t), intent(inout) :: monitor
       integer(ip), allocatable :: former(:)
 
-      call serialize_global(serializer, simulation, attempts, monitor)
+      call serialize_global(serializer, simulation, attempts)
       associate (s => simulation)
          if (serializer%is_reading) then
             former = s%bodies%id
@@ -85,17 +84,16 @@ contains
    end subroutine serialize_run
 
    !> Serialize the global fields: those of the whole run, not of bodies, boxes or pairs.
-   subroutine serialize_global(serializer, simulation, attempts, monitor)
+   subroutine serialize_global(serializer, simulation, attempts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
-      type(monitor_t), intent(inout) :: monitor
       integer(lp), allocatable :: tables(:)
       integer :: k
 
       call serialize_progress(serializer, simulation%step, attempts)
-      call serialize_monitor(monitor, serializer)
+      call serialize_guards(simulation, serializer)
       associate (s => simulation)
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')

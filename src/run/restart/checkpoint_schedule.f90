@@ -10,7 +10,6 @@ module polydem_checkpoint_schedule
    use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
-   use polydem_monitor, only: monitor_t
    use polydem_ownership, only: order_bodies, order_pieces, order_vertices
    use polydem_provenance, only: provenance_t
    use polydem_result_files, only: checkpoint_path, n_checkpoints
@@ -110,7 +109,7 @@ contains
    end subroutine decide
 
    !> Write a checkpoint over the older of the last two; collective.
-   subroutine write_checkpoint(self, folder, provenance, comm, simulation, attempts, monitor, error)
+   subroutine write_checkpoint(self, folder, provenance, comm, simulation, attempts, error)
       class(checkpoints_t), intent(inout) :: self
       !> Result folder
       character(len=*), intent(in) :: folder
@@ -119,7 +118,6 @@ contains
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
-      type(monitor_t), intent(inout) :: monitor
       !> Allocated if the checkpoint cannot be written; the last two are then unchanged
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
@@ -135,7 +133,7 @@ contains
       call complete_wall_forces(comm, simulation%search%neighbours%pairs%first, simulation%loop%walls, &
                                 simulation%bodies)
       call collect_counts(simulation)
-      call serialize_run(file, simulation, attempts, monitor)
+      call serialize_run(file, simulation, attempts)
       call file%complete(error)
       call limit%lift()
       if (allocated(error)) return

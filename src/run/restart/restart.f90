@@ -10,7 +10,6 @@ module polydem_restart
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
-   use polydem_monitor, only: monitor_t
    use polydem_provenance, only: origin_of
    use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_name, segment_path, trace_name
    use polydem_serializer, only: serializer_t
@@ -343,7 +342,7 @@ contains
    end subroutine serialize_earlier
 
    !> Restore the simulation from the checkpoint. Collective; all ranks get the same error.
-   subroutine restore(folder, earlier, revision, simulation, attempts, monitor, log, error)
+   subroutine restore(folder, earlier, revision, simulation, attempts, log, error)
       !> Result folder
       character(len=*), intent(in) :: folder
       !> State of the folder, with a checkpoint
@@ -355,7 +354,6 @@ contains
       !> On entry the scene hash, on return all attempts including this one
       type(attempts_t), intent(inout) :: attempts
       !> Monitor at time 0
-      type(monitor_t), intent(inout) :: monitor
       type(log_t), intent(inout) :: log
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error
@@ -363,7 +361,7 @@ contains
 
       call file%open(checkpoint_path(folder, earlier%checkpoint), error, simulation%comm)
       if (allocated(error)) return
-      call serialize_run(file, simulation, attempts, monitor)
+      call serialize_run(file, simulation, attempts)
       call file%close(error)
       if (allocated(error)) then
          if (error%is_unread) return

@@ -2,6 +2,7 @@
 module polydem_choose_methods
    use polydem_body_forces, only: body_forces_t, choose_body_forces
    use polydem_errors, only: error_t
+   use polydem_guard_list, only: choose_guards
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
    use polydem_law_factory, only: choose_parts
@@ -17,7 +18,8 @@ module polydem_choose_methods
 
 contains
 
-   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks, participants.
+   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks, participants,
+   !> guards.
    subroutine choose_methods(self, error)
       !> The simulation with its settings, and with the parameters of its first stage
       type(simulation_t), intent(inout) :: self
@@ -36,6 +38,7 @@ contains
          call choose_all_fields(settings, self%stages%drag, self%body_forces)
       end associate
       call choose_participants(self)
+      call choose_guards(self%settings, self%guards)
    end subroutine choose_methods
 
    !> Choose the forces that are no contacts: those of any stage, with the parameters of the strongest.

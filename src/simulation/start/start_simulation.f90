@@ -12,8 +12,9 @@ module polydem_start_simulation
    use polydem_enter_cell, only: check_constraint, enter_cell
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: find_median
+   use polydem_guard, only: set_global_limits
    use polydem_kinds, only: ip, wp
-   use polydem_local_data, only: limit_displacement, rebuild_local_data
+   use polydem_local_data, only: rebuild_local_data
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
    use polydem_settings, only: settings_t
@@ -82,7 +83,7 @@ contains
       if (.not. allocated(error)) call check_constraint(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion%check)
+      call set_global_limits(self)
       call self%motion%integrator%start(self%bodies)
       if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
