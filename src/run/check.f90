@@ -12,7 +12,7 @@ module polydem_check
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
-   use polydem_start_from, only: return_to_state
+   use polydem_start_state, only: return_to_state
    use polydem_strings, only: counted, to_text
    use polydem_scene_measures, only: measure_scene, scene_measures_t
    use polydem_thread_choice, only: thread_choice_t

@@ -81,7 +81,7 @@ contains
 
       associate (s => run%simulation, number => run%simulation%stages%number)
          if (number == 0_ip) return
-         associate (stage => s%settings%stage(number), gravity => s%settings%forces%gravity)
+         associate (stage => s%settings%stage(number), gravity => s%forces%gravity)
             text = 'stage      '//stage%name//', '//to_text(number)//' of '// &
                to_text(size(s%settings%stage, kind=ip))//', from step '//to_text(s%stages%first(number))
             if (stage%until == 'duration') text = text//' for '//to_text(stage%duration)//' s'
@@ -92,7 +92,7 @@ contains
                to_text(gravity(2), 3)//' m/s2'
             if (abs(stage%friction_scale - 1.0_wp) > 0.0_wp) text = text//', friction times '// &
                to_text(stage%friction_scale, 3)
-            if (stage%drag > 0.0_wp) text = text//', drag '//to_text(s%settings%forces%drag, 3)//' 1/s'
+            if (stage%drag > 0.0_wp) text = text//', drag '//to_text(s%forces%drag, 3)//' 1/s'
          end associate
       end associate
       call run%log%write_line(text)

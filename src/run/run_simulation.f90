@@ -1,6 +1,6 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
-   use polydem_check_ranks, only: check_ranks
+   use polydem_begin_run, only: begin_run
    use polydem_checkpoint_fields, only: attempts_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: choose_communicator, communicator_t
@@ -9,14 +9,11 @@ module polydem_run_simulation
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
    use polydem_monitor, only: asks_all, most_guards, set_warning_counts, report_pending_warnings, warning_counts
-   use polydem_oversubscription, only: oversubscription
-   use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
    use polydem_finish, only: finish
    use polydem_run_output, only: end_step, needs_table, update_balance, write_frame, write_stage
    use polydem_settings, only: settings_t
-   use polydem_begin_run, only: open_output
-   use polydem_start_from, only: return_to_state
+   use polydem_start_state, only: return_to_state
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_decomposition, stage_output
@@ -46,13 +43,7 @@ contains
       run%folder = result_folder(settings)
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
-      call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error)) call build_and_lock(settings, force, run, error)
-      if (.not. allocated(error)) then
-         run%oversubscription = oversubscription(run%comm)
-         call prepare(settings, force, run, error)
-      end if
-      if (.not. allocated(error)) call open_output(run, error)
+      call begin_run(settings, force, run, error)
       if (.not. allocated(error)) call run_steps(run, error)
       call run%lock%release()
    end subroutine run_simulation

@@ -38,7 +38,7 @@ contains
       !$omp    private(p, low, high) reduction(.and.:good)
       do p = 1, n_parts
          call part(n, n_parts, p, low, high)
-         call complete_part(self%dt, self%settings%forces%gravity, low, high, self%motion, self%loop, self%bodies, &
+         call complete_part(self%dt, self%forces%gravity, low, high, self%motion, self%loop, self%bodies, &
                             self%energy_balance, good)
       end do
       !$omp end parallel do

@@ -16,7 +16,7 @@ module polydem_simulation
    use polydem_run_stages, only: run_stages_t
    use polydem_serializer, only: serializer_t
    use polydem_series, only: series_t
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: forces_settings_t, settings_t
    use polydem_start_findings, only: expected_impact_t, relaxation_t, static_pressure_t
    use polydem_strings, only: counted
    use polydem_timers, only: timers_t
@@ -99,8 +99,11 @@ module polydem_simulation
 
    !> The complete state of a simulation on one rank
    type :: simulation_t
-      !> Settings of the run; gravity and drag of the group &forces are those of the present stage
+      !> Settings of the run, which do not change
       type(settings_t) :: settings
+      !> Parameters of the forces: those of the settings, with the stiffness that follows from the static pressure, and
+      !> gravity and drag of the present stage
+      type(forces_settings_t) :: forces
       !> Stages of the run
       type(run_stages_t) :: stages
       !> Communicator of the ranks that share the bodies
@@ -197,7 +200,7 @@ contains
       type(simulation_t), intent(in) :: self
       real(wp) :: gravity(2)
 
-      gravity = self%settings%forces%gravity + self%loop%force_sums%acceleration
+      gravity = self%forces%gravity + self%loop%force_sums%acceleration
    end function present_gravity
 
    !> Whether a step leaves nothing out for bodies that nothing touches: forces act on all bodies, or the border of a
@@ -218,7 +221,7 @@ contains
       type(participant_item_t), allocatable :: list(:)
       integer :: k
 
-      call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
+      call evaluate_balance(self%energy_balance, self%comm, self%dt, self%forces%gravity, self%bodies, &
                             self%loop%force_sums, self%loop%walls, balance)
       call move_alloc(self%participants, list)
       do k = 1, size(list)

@@ -144,13 +144,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
+      call self%body_forces%apply(self%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
       if (.not. allocated(self%law%constraint)) return
-      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
+      call total_forces(self%forces%gravity, self%loop%force_sums, self%bodies)
       call self%law%constraint%apply(self%dt, self%loop%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
-      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%loop%force_sums)
-      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
+      call assemble_forces(self%forces%gravity, self%contacts, self%bodies, self%loop%force_sums)
+      call self%body_forces%apply(self%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
       call select_walls(self%bodies, self%contacts, self%loop%walls)
    end subroutine add_other_forces
 
@@ -167,7 +167,7 @@ contains
       call check_contacts(self, error)
       call add_other_forces(self, error)
       if (allocated(error)) return
-      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
+      call total_forces(self%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine compute_forces
 
    !> After a failure, make the table of contacts of this step, and the forces on fixed bodies. Collective. The table
@@ -195,7 +195,7 @@ contains
          call check_contacts(self, known_error)
          call add_other_forces(self, known_error)
       end if
-      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
+      call total_forces(self%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine tabulate_contacts
 
    !> Apply the moves of the pair list to the columns of the contact history.

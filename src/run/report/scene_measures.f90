@@ -118,9 +118,9 @@ contains
                                                                                longest_run(s%settings)))
          end do
          call measure_sides(comm, s%bodies, s%walls, measures%sides)
-         gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
+         gravity = hypotenuse(s%forces%gravity(1), s%forces%gravity(2))
          if (gravity > 0.0_wp) then
-            down = abs(s%settings%forces%gravity)/gravity
+            down = abs(s%forces%gravity)/gravity
             measures%potential = gravity*measures%mass(3)*along(measures%extent)
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
             measures%static_depth = [measures%mass(1)*gravity, measures%density(2)*gravity &

@@ -61,7 +61,7 @@ contains
             call read_bodies(serializer, s%comm, s%bodies)
             if (.not. allocated(serializer%error)) call s%motion%integrator%start(s%bodies)
          else
-            call total_forces(s%settings%forces%gravity, s%loop%force_sums, s%bodies)
+            call total_forces(s%forces%gravity, s%loop%force_sums, s%bodies)
             call save_bodies(serializer, s%bodies)
          end if
          call s%motion%integrator%serialize(serializer)

@@ -45,7 +45,7 @@ contains
       self%loop%n_contacts = 0_ip
       self%loop%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%loop%force_sums)
-      call self%motion%flight%start(self%settings%forces%gravity, acts_on_all(self), self%motion%integrator, &
+      call self%motion%flight%start(self%forces%gravity, acts_on_all(self), self%motion%integrator, &
                                     self%bodies%n)
       self%loop%incidence = incidence_t()
       call list_moving(self%bodies, self%walls%driven, self%moving, self%n_moving)

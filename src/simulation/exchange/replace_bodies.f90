@@ -162,7 +162,7 @@ contains
       type(energy_balance_t), intent(out) :: entering
       type(force_sums_t) :: sums
 
-      associate (gravity => self%settings%forces%gravity)
+      associate (gravity => self%forces%gravity)
          call begin_sums(added%n, sums)
          call self%body_forces%apply(gravity, time_of(self), added, sums)
          call total_forces(gravity, sums, added)

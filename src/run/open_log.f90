@@ -1,86 +1,30 @@
-!> Preparation of a run: the scene, which all ranks build alike, the result folder, which the root rank manages, and the
-!> state of earlier attempts.
-module polydem_prepare
+!> The log of a run, and the state of earlier attempts, in a folder that the root rank has locked.
+module polydem_open_log
    use polydem_bodies_reader, only: read_origin
    use polydem_checked_files, only: check_manifest
    use polydem_claim_folder, only: claim_folder
-   use polydem_initial_warnings, only: warn_of_risks
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_file_system, only: make_folder
-   use polydem_kinds, only: dp, ip, lp
+   use polydem_kinds, only: ip, lp
    use polydem_log_tables, only: write_header
-   use polydem_monitor, only: new_monitor
    use polydem_provenance, only: collect_provenance
-   use polydem_recorder, only: check_recording
-   use polydem_restart, only: remove_surplus_files, find_restart
+   use polydem_restart, only: find_restart
    use polydem_result_files, only: overlaps_name
    use polydem_run, only: run_t
-   use polydem_series_row, only: collect_row
-   use polydem_output_intervals, only: choose_intervals
    use polydem_settings, only: settings_t
-   use polydem_begin_run, only: build_start, recall
-   use polydem_start_from, only: find_origin, origin_t
    use polydem_start_materials, only: material_names_text
+   use polydem_start_origin, only: find_origin, origin_t
    use polydem_wall_names, only: wall_names_text
    implicit none
    private
-   public :: build_and_lock, prepare, write_overlaps
+   public :: check_overwrite, open_log, write_overlaps, is_restart
 
 contains
-
-   !> Build the scene and lock the folder. Collective; all ranks get the same error.
-   subroutine build_and_lock(settings, force, run, error)
-      type(settings_t), intent(in) :: settings
-      !> Whether to replace an existing result
-      logical, intent(in) :: force
-      type(run_t), intent(inout) :: run
-      !> Allocated if the run cannot start
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (run%comm%is_root()) call check_overwrite(run, force, error)
-      call run%comm%all_reduce_error(error)
-      if (.not. allocated(error)) call build_start(settings, run, error)
-      if (allocated(error)) return
-      if (run%comm%is_root()) then
-         call make_folder(run%folder, error)
-         if (.not. allocated(error)) call run%lock%acquire(run%folder, run%folder_note, error, run%comm%size > 1_ip)
-      end if
-      call run%comm%all_reduce_error(error)
-   end subroutine build_and_lock
-
-   !> Open the log, describe the run, and restore the state of earlier attempts, in a folder that this run has locked.
-   !> Collective; all ranks get the same error.
-   subroutine prepare(settings, force, run, error)
-      type(settings_t), intent(in) :: settings
-      !> Whether to replace an existing result
-      logical, intent(in) :: force
-      !> The run, after `build_and_lock`
-      type(run_t), intent(inout) :: run
-      !> Allocated if the run cannot start
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (run%comm%is_root()) then
-         call open_log(settings, force, run, error)
-      else
-         call run%lock%join(run%folder)
-      end if
-      call run%comm%all_reduce_error(error)
-      if (allocated(error)) return
-      call write_overlaps(run, error)
-      call new_monitor(run%monitor, run%simulation)
-      if (run%comm%is_root()) call warn_of_risks(run%simulation, run%measures, run%log, run%monitor%at_start)
-      call choose_intervals(run)
-      ! A checkpoint has rows of the series without their columns.
-      if (run%series_steps > 0.0_dp .and. .not. allocated(error)) call collect_row(run%simulation)
-      if (.not. allocated(error)) call recall(run, error)
-      if (.not. allocated(error) .and. run%comm%is_root()) call finish_restart(run, error)
-      call run%comm%all_reduce_error(error)
-   end subroutine prepare
 
    !> Refuse to overwrite a result without --force, and to use a folder whose manifest is damaged.
    subroutine check_overwrite(run, force, error)
       type(run_t), intent(inout) :: run
+      !> Whether to replace an existing result
       logical, intent(in) :: force
       type(error_t), allocatable, intent(inout) :: error
 
@@ -92,9 +36,10 @@ contains
                  '--set output.folder=NAME')
    end subroutine check_overwrite
 
-   !> Find the state of earlier attempts, claim the folder, open the log and describe the run.
+   !> Find the state of earlier attempts, claim the folder, open the log and describe the run. Only the root rank does it.
    subroutine open_log(settings, force, run, error)
       type(settings_t), intent(in) :: settings
+      !> Whether to replace an existing result
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
@@ -139,16 +84,6 @@ contains
       is_restart = run%earlier%checkpoint > 0_ip .or. run%earlier%segments > 0_ip
    end function is_restart
 
-   !> Check the recording, and remove the files of earlier attempts that the run does not keep.
-   subroutine finish_restart(run, error)
-      type(run_t), intent(inout) :: run
-      type(error_t), allocatable, intent(inout) :: error
-
-      call check_recording(run%simulation, run%folder, error)
-      if (is_restart(run) .and. .not. allocated(error)) &
-         call remove_surplus_files(run%folder, run%manifest, run%earlier, error)
-   end subroutine finish_restart
-
    !> Write the deep initial contacts to the log and to a table. Collective; all ranks get the same error.
    subroutine write_overlaps(run, error)
       type(run_t), intent(inout) :: run
@@ -162,4 +97,4 @@ contains
       call run%comm%all_reduce_error(error)
    end subroutine write_overlaps
 
-end module polydem_prepare
+end module polydem_open_log
