@@ -11,7 +11,7 @@ module polydem_begin_run
    use polydem_output_intervals, only: choose_intervals, frames_per_segment
    use polydem_oversubscription, only: oversubscription
    use polydem_recorder, only: check_recording
-   use polydem_restart, only: remove_surplus_files, restore, serialize_earlier
+   use polydem_restart, only: remove_surplus_files, restore, serialize_previous
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_run, only: run_t
    use polydem_series_row, only: collect_row
@@ -24,7 +24,7 @@ module polydem_begin_run
 
 contains
 
-   !> Build the scene, lock the folder, open the log, describe the run, restore the state of earlier attempts, and open
+   !> Build the scene, lock the folder, open the log, describe the run, restore the state of previous starts, and open
    !> the output files. Collective; all ranks get the same error.
    subroutine begin_run(settings, force, run, error)
       type(settings_t), intent(in) :: settings
@@ -108,21 +108,21 @@ contains
       if (run%series_steps > 0.0_dp) call collect_row(run%simulation)
       allocate (broadcaster%comm, source=run%comm)
       broadcaster%is_reading = .not. run%comm%is_root()
-      call serialize_earlier(broadcaster, run%earlier)
+      call serialize_previous(broadcaster, run%previous)
       call run%checkpoints%open(run%simulation%settings%checkpoint, run%simulation%dt, run%began, &
-                                merge(run%attempt%limit, 0.0_dp, run%comm%is_root()))
-      if (allocated(run%earlier%remark)) call run%log%write_line(run%earlier%remark)
-      if (run%earlier%checkpoint == 0_ip) return
-      call run%provenance%set('parent', checkpoint_path(run%folder, run%earlier%checkpoint)//', step '// &
-                              to_text(run%earlier%step))
-      call restore(run%folder, run%earlier, run%provenance%text_of('revision'), run%simulation, run%attempts, &
+                                merge(run%options%limit, 0.0_dp, run%comm%is_root()))
+      if (allocated(run%previous%note)) call run%log%write_line(run%previous%note)
+      if (run%previous%checkpoint == 0_ip) return
+      call run%provenance%set('parent', checkpoint_path(run%folder, run%previous%checkpoint)//', step '// &
+                              to_text(run%previous%step))
+      call restore(run%folder, run%previous, run%provenance%text_of('revision'), run%simulation, run%restarts, &
                    run%log, error)
       if (allocated(error)) return
-      run%checkpoints%last_step = run%earlier%step
-      run%checkpoints%next = modulo(run%earlier%checkpoint, n_checkpoints) + 1_ip
+      run%checkpoints%last_step = run%previous%step
+      run%checkpoints%next = modulo(run%previous%checkpoint, n_checkpoints) + 1_ip
    end subroutine recall
 
-   !> Check the recording, and remove the files of earlier attempts that the run does not keep. Collective; all ranks get
+   !> Check the recording, and remove the files of previous starts that the run does not keep. Collective; all ranks get
    !> the same error.
    subroutine finish_restart(run, error)
       type(run_t), intent(inout) :: run
@@ -131,7 +131,7 @@ contains
       if (run%comm%is_root()) then
          call check_recording(run%simulation, run%folder, error)
          if (is_restart(run) .and. .not. allocated(error)) &
-            call remove_surplus_files(run%folder, run%manifest, run%earlier, error)
+            call remove_surplus_files(run%folder, run%manifest, run%previous, error)
       end if
       call run%comm%all_reduce_error(error)
    end subroutine finish_restart
@@ -144,7 +144,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call run%trajectory%open(run%folder, frames_per_segment(run%simulation), run%provenance, error, &
-                               run%earlier%segments, run%comm, allocated(run%simulation%traffic))
+                               run%previous%segments, run%comm, allocated(run%simulation%traffic))
       if (run%comm%size == 1_ip .and. .not. allocated(error)) &
          call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
    end subroutine open_output

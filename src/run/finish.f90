@@ -37,7 +37,7 @@ contains
       integer(lp) :: is_not_finite(1)
 
       associate (s => run%simulation, bodies => run%simulation%bodies)
-         if (code /= run_error .or. s%step <= max(run%last_frame, run%earlier%last_frame)) return
+         if (code /= run_error .or. s%step <= max(run%last_frame, run%previous%last_frame)) return
          is_not_finite = merge(0_lp, 1_lp, all(ieee_is_finite(bodies%position)) &
                                .and. all(ieee_is_finite(bodies%velocity)) .and. all(ieee_is_finite(bodies%angle)) &
                                .and. all(ieee_is_finite(bodies%angular_velocity)))
@@ -52,7 +52,7 @@ contains
    !> End a run, also after a failure: close the trajectory, write the profile and the summary of the log; collective.
    subroutine finish(run, seconds, error)
       type(run_t), intent(inout) :: run
-      !> Elapsed time of all attempts [s]
+      !> Elapsed time of the run with its previous starts [s]
       real(dp), intent(in) :: seconds
       !> On entry the reason why the run did not finish; on return that, or a failure to write the end
       type(error_t), allocatable, intent(inout) :: error

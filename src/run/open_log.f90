@@ -1,4 +1,4 @@
-!> The log of a run, and the state of earlier attempts, in a folder that the root rank has locked.
+!> The log of a run, and the state of previous starts, in a folder that the root rank has locked.
 module polydem_open_log
    use polydem_bodies_reader, only: read_origin
    use polydem_checked_files, only: check_manifest
@@ -30,13 +30,13 @@ contains
 
       call run%manifest%read(run%folder)
       call check_manifest(run%manifest, error)
-      if (force .or. run%attempt%continues .or. .not. run%manifest%is_found) return
+      if (force .or. run%options%continues .or. .not. run%manifest%is_found) return
       call raise(error, input_error, run%folder//' already holds a result; add --continue '// &
                  'to resume it or --force to set it aside and start again, or choose another folder with '// &
                  '--set output.folder=NAME')
    end subroutine check_overwrite
 
-   !> Find the state of earlier attempts, claim the folder, open the log and describe the run. Only the root rank does it.
+   !> Find the state of previous starts, claim the folder, open the log and describe the run, on the root rank only.
    subroutine open_log(settings, force, run, error)
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result
@@ -55,16 +55,16 @@ contains
       if (settings%scene%bodies_file /= '') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return
       run%provenance%processes = run%comm%size
-      if (allocated(run%attempt%threads%reason)) call run%provenance%set('thread_choice', run%attempt%threads%reason)
-      if (run%manifest%is_found .and. run%attempt%continues) &
-         call find_restart(run%folder, run%manifest, run%simulation, run%scene_hash, run%attempt%may_change, &
-                           run%earlier, error)
+      if (allocated(run%options%threads%reason)) call run%provenance%set('thread_choice', run%options%threads%reason)
+      if (run%manifest%is_found .and. run%options%continues) &
+         call find_restart(run%folder, run%manifest, run%simulation, run%scene_hash, run%options%may_change, &
+                           run%previous, error)
       if (allocated(error)) return
       call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), &
                         run%comm%size > 1_ip, run%lock, run%folder_note, run%manifest, error)
       call run%provenance%set('run', run%manifest%run)
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run), &
-         brief=run%attempt%is_brief)
+         brief=run%options%is_brief)
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (run%oversubscription /= '') call run%log%write_line(run%oversubscription)
@@ -77,11 +77,11 @@ contains
       call describe(run%simulation, run%measures, run%log)
    end subroutine open_log
 
-   !> Whether the run keeps files of earlier attempts
+   !> Whether the run keeps files of previous starts
    pure logical function is_restart(run)
       type(run_t), intent(in) :: run
 
-      is_restart = run%earlier%checkpoint > 0_ip .or. run%earlier%segments > 0_ip
+      is_restart = run%previous%checkpoint > 0_ip .or. run%previous%segments > 0_ip
    end function is_restart
 
    !> Write the deep initial contacts to the log and to a table. Collective; all ranks get the same error.

@@ -112,29 +112,29 @@ contains
       call name_terms(run%balance, .not. run%simulation%bodies%cell%is_periodic, run%row)
    end subroutine update_balance
 
-   !> Keep a row of the series if one is due, unless a file of an earlier attempt has it; collective.
+   !> Keep a row of the series if one is due, unless a file of a previous start has it; collective.
    subroutine record_row(run)
       type(run_t), intent(inout) :: run
 
       associate (s => run%simulation)
-         if (.not. run%series_steps > 0.0_dp .or. s%step <= run%earlier%last_frame) return
+         if (.not. run%series_steps > 0.0_dp .or. s%step <= run%previous%last_frame) return
          if (.not. is_due(s%step, s%n_steps, run%series_steps)) return
          call collect_row(s)
          call s%series%keep_row(s%step, real(time_of(s), dp))
       end associate
    end subroutine record_row
 
-   !> Write a frame, unless this or an earlier attempt wrote it; collective.
+   !> Write a frame, unless this or a previous start wrote it; collective.
    subroutine write_frame(run, error)
       type(run_t), intent(inout) :: run
       !> Allocated if it cannot be written
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%simulation%step <= max(run%last_frame, run%earlier%last_frame)) return
+      if (run%simulation%step <= max(run%last_frame, run%previous%last_frame)) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
          if (allocated(s%traffic)) then
-            call s%traffic%departures%drop_rows(run%earlier%last_frame)
+            call s%traffic%departures%drop_rows(run%previous%last_frame)
             if (output%contacts) then
                call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, &
                                                run%manifest, s%series, s%traffic%departures)

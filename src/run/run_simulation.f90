@@ -1,7 +1,7 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
    use polydem_begin_run, only: begin_run
-   use polydem_checkpoint_fields, only: attempts_t
+   use polydem_checkpoint_fields, only: restarts_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_end_condition, only: decide_end, is_at_limit, pass_end
@@ -24,41 +24,41 @@ module polydem_run_simulation
 contains
 
    !> Run a simulation, and write trajectory, profile and log to its result folder; collective.
-   subroutine run_simulation(settings, force, error, attempt, comm)
+   subroutine run_simulation(settings, force, error, options, comm)
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result (--force)
       logical, intent(in) :: force
       !> Allocated if the run fails, or if a signal or the time limit ends it early
       type(error_t), allocatable, intent(inout) :: error
-      !> Options of this attempt; absent: a new run without a time limit
-      type(run_options_t), intent(in), optional :: attempt
+      !> Options of this start; absent: a new run without a time limit
+      type(run_options_t), intent(in), optional :: options
       !> Communicator of the run, absent: a serial one. Only its root rank writes files that the ranks do not share
       class(communicator_t), intent(in), optional :: comm
       type(run_t) :: run
       character(len=:), allocatable :: last_state
 
       run%began = wall_seconds()
-      if (present(attempt)) run%attempt = attempt
+      if (present(options)) run%options = options
       call choose_communicator(run%comm, comm)
       run%folder = result_folder(settings)
-      if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
+      if (run%options%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
       call begin_run(settings, force, run, error)
       if (.not. allocated(error)) call run_steps(run, error)
       call run%lock%release()
    end subroutine run_simulation
 
-   !> Write the first frame unless an earlier attempt wrote it, run all steps, and end the run; collective.
+   !> Write the first frame unless a previous start wrote it, run all steps, and end the run; collective.
    subroutine run_steps(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: begins, is_due, must_stop
       integer(lp) :: first
 
-      if (run%earlier%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
+      if (run%previous%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
       call write_stage(run)
       first = run%simulation%step
-      if (run%earlier%checkpoint == 0_ip) then
+      if (run%previous%checkpoint == 0_ip) then
          call end_step(run, error)
          if (.not. allocated(error)) call return_to_state(run%simulation, error)
       end if
@@ -72,11 +72,11 @@ contains
          if (run%simulation%stages%number > 0_ip .and. .not. allocated(error)) call change_stage(run, error)
          if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
       end do
-      call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
+      call finish(run, run%restarts%seconds + (wall_seconds() - run%began), error)
       ! The result is complete without it. Before its first step a continued run has no pairs that it could write; the
       ! checkpoint from which it came is that of its end.
       if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) then
-         if (run%simulation%step > first .or. run%earlier%checkpoint == 0_ip) call write_checkpoint(run, error)
+         if (run%simulation%step > first .or. run%previous%checkpoint == 0_ip) call write_checkpoint(run, error)
       end if
       call run%comm%all_reduce_error(error)
    end subroutine run_steps
@@ -145,7 +145,7 @@ contains
    subroutine write_checkpoint(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
 
       associate (s => run%simulation)
          call s%timers%start()
@@ -154,10 +154,10 @@ contains
          ! The frames up to the checkpoint are on disk before the checkpoint is.
          call run%trajectory%close(error, run%manifest)
          if (allocated(error)) return
-         attempts = run%attempts
-         attempts%segments = int(run%trajectory%number, lp)
-         attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
-         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, error)
+         restarts = run%restarts
+         restarts%segments = int(run%trajectory%number, lp)
+         restarts%seconds = restarts%seconds + (wall_seconds() - run%began)
+         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, restarts, error)
          call s%timers%add_to_total(stage_output)
       end associate
    end subroutine write_checkpoint

@@ -39,11 +39,11 @@ contains
 
       if (allocated(run%scene_hash)) return
       call find_former_step(run, former_step)
-      call new_simulation(settings, run%simulation, error, run%comm, run%attempt%threads, former_step)
+      call new_simulation(settings, run%simulation, error, run%comm, run%options%threads, former_step)
       if (allocated(error)) return
       call measure_scene(run%simulation, run%measures)
-      call hash_scene(run%comm, run%simulation%bodies, run%attempts%scene)
-      run%scene_hash = hexadecimal(run%attempts%scene)
+      call hash_scene(run%comm, run%simulation%bodies, run%restarts%scene)
+      run%scene_hash = hexadecimal(run%restarts%scene)
    end subroutine build_start
 
    !> Build the scene and the simulation that the settings define. Collective; all ranks get the same error.
@@ -57,7 +57,7 @@ contains
       class(communicator_t), intent(in), optional :: comm
       !> How the number of threads is determined; default: it is set already
       type(thread_choice_t), intent(inout), optional :: threads
-      !> Time step of an earlier attempt, which the simulation keeps unless the settings have one [s]; 0: there is none
+      !> Time step of a previous start, which the simulation keeps unless the settings have one [s]; 0: there is none
       real(wp), intent(in), optional :: former_step
       class(communicator_t), allocatable :: ranks
       type(wall_bodies_t), allocatable :: of_result(:)

@@ -112,7 +112,10 @@ PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "sce
                 words={"scene.corners_min=3": "3, 12", "scene.corners_max=20": "7, 20",
                        "scene.long_axis_min=9e-3": "9e-3, 11e-3", "scene.long_axis_max=15e-3": "8e-3, 15e-3"},
                 # The settings of a sample, as text; points and normals of contacts, and what follows from points
-                data={"sample/case/input": None, "trajectory/contacts/point": None, "trajectory/contacts/normal": None,
+                data={"trajectory/frames/slid": "frames/shear_offset", "checkpoint/bodies/slid": "bodies/shear_offset",
+                      # The present one counts no more
+                      "checkpoint/run/attempts": None,
+                      "sample/case/input": None, "trajectory/contacts/point": None, "trajectory/contacts/normal": None,
                       **{f"trajectory/series/{name}": None for name in (
                           "stress_xx", "stress_xy", "stress_yx", "stress_yy", "inertial_number")}},
                 places={"laboratory": "src/app/polydem_lab"})

@@ -137,9 +137,9 @@ contains
       if (any([(moves_away(settings%motion(k)%kind), k=1, size(settings%motion))]) .or. size(settings%load) > 0) return
       parts%walls = settings%wall
       do k = 1, size(settings%grains)
-         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, forces, settings%grains(k)))) call add(warnings, &
-            'the grains of group '//settings%grains(k)%name//' start beside all walls and will meet none; move '// &
-            'their region between or above the walls')
+         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, forces, settings%grains(k)))) &
+            call add(warnings, 'the grains of group '//settings%grains(k)%name//' start beside '// &
+                     'all walls and will meet none; move their region between or above the walls')
       end do
    end subroutine warn_of_regions
 

@@ -25,36 +25,36 @@ module polydem_checkpoint_fields
    use polydem_wall, only: hash_of_tables
    implicit none
    private
-   public :: attempts_t, serialize_run, serialize_progress, read_pairs
+   public :: restarts_t, serialize_run, serialize_progress, read_pairs
 
    !> Number of pairs that are read at a time
    integer(lp), parameter :: most_rows = 65536_lp
 
-   !> Hash of the initial scene, and counts of all attempts of a run
-   type :: attempts_t
+   !> Hash of the initial scene, and counts of a run with its restarts
+   type :: restarts_t
       !> `hash_scene` of the bodies at time 0
       integer(lp) :: scene = 0_lp
-      !> Number of attempts, including the present one
-      integer(lp) :: attempts = 1_lp
+      !> Number of restarts so far
+      integer(lp) :: number = 0_lp
       !> Elapsed time of the run up to the checkpoint, without repeated steps [s]
       real(dp) :: seconds = 0.0_dp
       !> Number of closed segments of the trajectory
       integer(lp) :: segments = 0_lp
-   end type attempts_t
+   end type restarts_t
 
 contains
 
    !> Write the state of a run to a serializer, or restore it from there.
-   subroutine serialize_run(serializer, simulation, attempts)
+   subroutine serialize_run(serializer, simulation, restarts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Written: the simulation at the end of a step. Restored: on entry any state of the same scene, on return the
       !> stored state without contacts, which the next step computes
       type(simulation_t), intent(inout) :: simulation
-      type(attempts_t), intent(inout) :: attempts
+      type(restarts_t), intent(inout) :: restarts
       integer(ip), allocatable :: former(:)
 
-      call serialize_global(serializer, simulation, attempts)
+      call serialize_global(serializer, simulation, restarts)
       associate (s => simulation)
          if (serializer%is_reading) then
             former = s%bodies%id
@@ -84,20 +84,20 @@ contains
    end subroutine serialize_run
 
    !> Serialize the global fields: those of the whole run, not of bodies, boxes or pairs.
-   subroutine serialize_global(serializer, simulation, attempts)
+   subroutine serialize_global(serializer, simulation, restarts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       type(simulation_t), intent(inout) :: simulation
-      type(attempts_t), intent(inout) :: attempts
+      type(restarts_t), intent(inout) :: restarts
       integer(lp), allocatable :: tables(:)
       integer :: k
 
-      call serialize_progress(serializer, simulation%step, attempts)
+      call serialize_progress(serializer, simulation%step, restarts)
       call serialize_guards(simulation, serializer)
       associate (s => simulation)
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
-         call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
+         call serializer%match('/run/scene', [restarts%scene], '1', 'hash of the bodies at the start')
          associate (driven => s%walls%driven)
             tables = [(hash_of_tables(driven(k)), k=1, size(driven))]
             if (any(tables /= 0_lp)) call serializer%match('/run/motion_tables', tables, '1', &
@@ -116,20 +116,20 @@ contains
    end subroutine serialize_global
 
    !> Serialize the progress of a run. This part of `serialize_run` needs no simulation.
-   subroutine serialize_progress(serializer, step, attempts)
+   subroutine serialize_progress(serializer, step, restarts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Number of completed steps
       integer(lp), intent(inout) :: step
-      type(attempts_t), intent(inout) :: attempts
+      type(restarts_t), intent(inout) :: restarts
       real(dp) :: seconds(1)
 
       call serializer%field('/run/step', step, '1', 'completed steps')
-      call serializer%field('/run/attempts', attempts%attempts, '1', 'attempts, including the present one')
-      call serializer%field('/run/segments', attempts%segments, '1', 'closed segments of the trajectory')
-      seconds = attempts%seconds
+      call serializer%field('/run/restarts', restarts%number, '1', 'restarts so far')
+      call serializer%field('/run/segments', restarts%segments, '1', 'closed segments of the trajectory')
+      seconds = restarts%seconds
       call serializer%seconds_field('/run/seconds', seconds, 'elapsed time of the run, without repeated steps')
-      attempts%seconds = seconds(1)
+      restarts%seconds = seconds(1)
    end subroutine serialize_progress
 
    !> Save the pairs and their contact history.

@@ -54,7 +54,7 @@ contains
          bodies%pieces%most = origin%around%most_pieces
          ! Paths through the copies of a cell go on.
          bodies%cell%is_periodic = origin%around%has_images .and. settings%cell%periodic /= 'none'
-         bodies%cell%is_sheared = origin%around%has_slides .and. bodies%cell%is_periodic
+         bodies%cell%is_sheared = origin%around%has_shear_offset .and. bodies%cell%is_periodic
          call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')

@@ -1,6 +1,6 @@
 !> Where a run starts that starts from a result: at its last checkpoint, or at one of its frames.
 module polydem_start_origin
-   use polydem_checkpoint_fields, only: attempts_t, serialize_progress
+   use polydem_checkpoint_fields, only: restarts_t, serialize_progress
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists, is_folder
@@ -100,7 +100,7 @@ contains
       type(origin_t), intent(inout) :: origin
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
       integer(lp) :: step, newest
       integer(ip) :: k
 
@@ -109,7 +109,7 @@ contains
          if (.not. exists(checkpoint_path(folder, k), error)) cycle
          call file%open(checkpoint_path(folder, k), error)
          if (allocated(error)) return
-         call serialize_progress(file, step, attempts)
+         call serialize_progress(file, step, restarts)
          call file%close(error)
          if (allocated(error)) return
          if (step <= newest) cycle

@@ -81,7 +81,7 @@ contains
          call file%choose_rows('/bodies/', rows_of(bodies%global_index, origin%gone))
          ! The result may have had no cell, or one without shear.
          if (.not. origin%around%has_images .and. allocated(bodies%image)) deallocate (bodies%image)
-         if (.not. origin%around%has_slides .and. allocated(bodies%slid)) deallocate (bodies%slid)
+         if (.not. origin%around%has_shear_offset .and. allocated(bodies%shear_offset)) deallocate (bodies%shear_offset)
          call serialize_bodies(file, bodies)
          call set_cell(bodies, before%cell)
          if (bodies%cell%is_periodic) call join_copies(simulation%settings%cell, bodies%free, bodies)

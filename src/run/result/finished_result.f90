@@ -32,7 +32,7 @@ contains
       integer :: k
 
       found = 0_lp
-      if (run%comm%is_root() .and. run%attempt%continues) then
+      if (run%comm%is_root() .and. run%options%continues) then
          call run%manifest%read(run%folder)
          k = run%manifest%place_of(profile_name)
          if (k > 0 .and. .not. allocated(run%manifest%problem)) &
