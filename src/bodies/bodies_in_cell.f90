@@ -26,7 +26,8 @@ contains
 
       bodies%cell = cell
       if (cell%is_periodic .and. .not. allocated(bodies%image)) allocate (bodies%image(bodies%n, 2), source=0_ip)
-      if (cell%is_sheared .and. .not. allocated(bodies%shear_offset)) allocate (bodies%shear_offset(bodies%n), source=0.0_wp)
+      if (cell%is_sheared .and. .not. allocated(bodies%shear_offset)) &
+         allocate (bodies%shear_offset(bodies%n), source=0.0_wp)
    end subroutine set_cell
 
    !> Change size and shear of the cell by a step.
@@ -128,7 +129,8 @@ contains
 
    !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
    pure subroutine wrap_bodies(bodies, slots)
-      !> Bodies at the end of a step; `position` and `image` change, in a sheared cell also `velocity` and `shear_offset`
+      !> Bodies at the end of a step; `position` and `image` change, in a sheared cell also `velocity` and
+      !> `shear_offset`
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in), contiguous :: slots(:)
