@@ -73,7 +73,7 @@ module polydem_bodies
       !> would be at `position + image*cell%size`, (slot, x or y)
       integer(ip), allocatable :: image(:, :)
       !> In a sheared cell what `image` lacks: sum of the shifts of the borders that each body has crossed, (slot) [m]
-      real(wp), allocatable :: slid(:)
+      real(wp), allocatable :: shear_offset(:)
       !> In a periodic cell 1/size for each body and axis, 0 along axes along which it does not repeat, (2, slot) [1/m]
       real(wp), allocatable :: folds(:, :)
       !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`

@@ -1,7 +1,7 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
-   use polydem_check_ranks, only: check_ranks
-   use polydem_checkpoint_fields, only: attempts_t
+   use polydem_begin_run, only: begin_run
+   use polydem_checkpoint_fields, only: restarts_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_end_condition, only: decide_end, is_at_limit, pass_end
@@ -9,14 +9,11 @@ module polydem_run_simulation
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
    use polydem_monitor, only: asks_all, most_guards, set_warning_counts, report_pending_warnings, warning_counts
-   use polydem_oversubscription, only: oversubscription
-   use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
    use polydem_finish, only: finish
    use polydem_run_output, only: end_step, needs_table, update_balance, write_frame, write_stage
    use polydem_settings, only: settings_t
-   use polydem_begin_run, only: open_output
-   use polydem_start_from, only: return_to_state
+   use polydem_start_state, only: return_to_state
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_decomposition, stage_output
@@ -27,47 +24,41 @@ module polydem_run_simulation
 contains
 
    !> Run a simulation, and write trajectory, profile and log to its result folder; collective.
-   subroutine run_simulation(settings, force, error, attempt, comm)
+   subroutine run_simulation(settings, force, error, options, comm)
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result (--force)
       logical, intent(in) :: force
       !> Allocated if the run fails, or if a signal or the time limit ends it early
       type(error_t), allocatable, intent(inout) :: error
-      !> Options of this attempt; absent: a new run without a time limit
-      type(run_options_t), intent(in), optional :: attempt
+      !> Options of this start; absent: a new run without a time limit
+      type(run_options_t), intent(in), optional :: options
       !> Communicator of the run, absent: a serial one. Only its root rank writes files that the ranks do not share
       class(communicator_t), intent(in), optional :: comm
       type(run_t) :: run
       character(len=:), allocatable :: last_state
 
       run%began = wall_seconds()
-      if (present(attempt)) run%attempt = attempt
+      if (present(options)) run%options = options
       call choose_communicator(run%comm, comm)
       run%folder = result_folder(settings)
-      if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
+      if (run%options%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
-      call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error)) call build_and_lock(settings, force, run, error)
-      if (.not. allocated(error)) then
-         run%oversubscription = oversubscription(run%comm)
-         call prepare(settings, force, run, error)
-      end if
-      if (.not. allocated(error)) call open_output(run, error)
+      call begin_run(settings, force, run, error)
       if (.not. allocated(error)) call run_steps(run, error)
       call run%lock%release()
    end subroutine run_simulation
 
-   !> Write the first frame unless an earlier attempt wrote it, run all steps, and end the run; collective.
+   !> Write the first frame unless a previous start wrote it, run all steps, and end the run; collective.
    subroutine run_steps(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: begins, is_due, must_stop
       integer(lp) :: first
 
-      if (run%earlier%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
+      if (run%previous%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
       call write_stage(run)
       first = run%simulation%step
-      if (run%earlier%checkpoint == 0_ip) then
+      if (run%previous%checkpoint == 0_ip) then
          call end_step(run, error)
          if (.not. allocated(error)) call return_to_state(run%simulation, error)
       end if
@@ -81,11 +72,11 @@ contains
          if (run%simulation%stages%number > 0_ip .and. .not. allocated(error)) call change_stage(run, error)
          if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
       end do
-      call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
+      call finish(run, run%restarts%seconds + (wall_seconds() - run%began), error)
       ! The result is complete without it. Before its first step a continued run has no pairs that it could write; the
       ! checkpoint from which it came is that of its end.
       if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) then
-         if (run%simulation%step > first .or. run%earlier%checkpoint == 0_ip) call write_checkpoint(run, error)
+         if (run%simulation%step > first .or. run%previous%checkpoint == 0_ip) call write_checkpoint(run, error)
       end if
       call run%comm%all_reduce_error(error)
    end subroutine run_steps
@@ -105,12 +96,12 @@ contains
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
       flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), &
-               merge(1_lp, 0_lp, asks_all(run%monitor, run%simulation)), warning_counts(run%monitor)]
+               merge(1_lp, 0_lp, asks_all(run%simulation)), warning_counts(run%simulation)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
       run%monitor%is_asked = flags(3) == 1_lp
-      call set_warning_counts(run%monitor, flags(4:))
+      call set_warning_counts(run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 
@@ -154,19 +145,19 @@ contains
    subroutine write_checkpoint(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
 
       associate (s => run%simulation)
          call s%timers%start()
          ! A checkpoint holds the number of warnings, not their text.
-         call report_pending_warnings(run%monitor, s, run%log)
+         call report_pending_warnings(s, run%log)
          ! The frames up to the checkpoint are on disk before the checkpoint is.
          call run%trajectory%close(error, run%manifest)
          if (allocated(error)) return
-         attempts = run%attempts
-         attempts%segments = int(run%trajectory%number, lp)
-         attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
-         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, run%monitor, error)
+         restarts = run%restarts
+         restarts%segments = int(run%trajectory%number, lp)
+         restarts%seconds = restarts%seconds + (wall_seconds() - run%began)
+         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, restarts, error)
          call s%timers%add_to_total(stage_output)
       end associate
    end subroutine write_checkpoint

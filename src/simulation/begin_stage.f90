@@ -24,30 +24,31 @@ module polydem_begin_stage
 contains
 
    !> Take the parameters of the first stage, before the simulation starts.
-   subroutine prepare_stages(settings, stages)
-      !> Settings; gravity and drag of &forces become those of the first stage
-      type(settings_t), intent(inout) :: settings
+   subroutine prepare_stages(settings, stages, forces)
+      type(settings_t), intent(in) :: settings
       type(run_stages_t), intent(inout) :: stages
-
-      if (size(settings%stage) == 0) return
-      stages%gravity = settings%forces%gravity
-      stages%drag = settings%forces%drag
-      stages%number = 1_ip
-      stages%first = [0_lp]
-      call set_parameters(settings%stage(1), stages, settings%forces)
-   end subroutine prepare_stages
-
-   !> Take the parameters of a stage.
-   subroutine set_parameters(stage, stages, forces)
-      type(stage_settings_t), intent(in) :: stage
-      type(run_stages_t), intent(inout) :: stages
-      !> Gravity and drag of the present stage
+      !> Parameters of the forces, as in the settings; gravity and drag become those of the first stage
       type(forces_settings_t), intent(inout) :: forces
 
-      forces%gravity = stages%gravity
-      if (size(stage%gravity) == 2) forces%gravity = stage%gravity
-      forces%drag = stages%drag + stage%drag
-      stages%friction_scale = stage%friction_scale
+      if (size(settings%stage) == 0) return
+      stages%number = 1_ip
+      stages%first = [0_lp]
+      call set_parameters(settings, stages, forces)
+   end subroutine prepare_stages
+
+   !> Take the parameters of the present stage.
+   subroutine set_parameters(settings, stages, forces)
+      type(settings_t), intent(in) :: settings
+      type(run_stages_t), intent(inout) :: stages
+      !> Parameters of the forces; gravity and drag are set
+      type(forces_settings_t), intent(inout) :: forces
+
+      associate (stage => settings%stage(stages%number))
+         forces%gravity = settings%forces%gravity
+         if (size(stage%gravity) == 2) forces%gravity = stage%gravity
+         forces%drag = settings%forces%drag + stage%drag
+         stages%friction_scale = stage%friction_scale
+      end associate
    end subroutine set_parameters
 
    !> Begin the next stage at the end of a step. Collective.
@@ -56,17 +57,17 @@ contains
       type(simulation_t), intent(inout) :: self
       real(wp) :: former(2)
 
-      former = self%settings%forces%gravity
+      former = self%forces%gravity
       associate (stages => self%stages)
          stages%number = stages%number + 1_ip
          stages%first = [stages%first, self%step]
          stages%is_decided = .false.
          stages%held_since = -1_lp
          stages%value = -1.0_wp
-         call set_parameters(self%settings%stage(stages%number), stages, self%settings%forces)
+         call set_parameters(self%settings, stages, self%forces)
          if (self%settings%stage(stages%number)%until == 'strain') stages%reference = wall_vector(self)
       end associate
-      associate (gravity => self%settings%forces%gravity)
+      associate (gravity => self%forces%gravity)
          if (self%settings%output%energy_balance .and. any(abs(gravity - former) > 0.0_wp)) call change_gravity( &
             self%energy_balance, self%comm, self%dt, former, gravity, self%bodies)
       end associate
@@ -80,8 +81,8 @@ contains
       integer :: j, k
 
       call self%law%scale_friction(self%stages%friction_scale)
-      call self%body_forces%configure(self%settings%forces)
-      call self%motion%flight%start(self%settings%forces%gravity, acts_on_all(self), self%motion%integrator, &
+      call self%body_forces%configure(self%forces)
+      call self%motion%flight%start(self%forces%gravity, acts_on_all(self), self%motion%integrator, &
                                     self%bodies%n)
       do j = 1, size(self%walls%driven)
          do k = 1, size(self%walls%driven(j)%motions)
@@ -149,7 +150,7 @@ contains
                     'namelist has only '//to_text(size(self%settings%stage, kind=ip))//' groups &stage')
          return
       end if
-      call set_parameters(self%settings%stage(self%stages%number), self%stages, self%settings%forces)
+      call set_parameters(self%settings, self%stages, self%forces)
       call use_parameters(self)
       call find_last_steps(self%settings%stage, self%dt, self%stages, self%n_steps)
       associate (stage => self%settings%stage(self%stages%number))

@@ -16,7 +16,6 @@ module polydem_contact_loop
    use polydem_errors, only: error_t
    use polydem_fill_block, only: fill_block
    use polydem_force_sums, only: add_deferred_terms, add_terms, begin_sums, clear_sums, contact_terms_t, terms_of_block
-   use polydem_motion_check, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: find_owned_pairs
    use polydem_pair_ranges, only: balance_ranges, divide_pairs, most_ranges
@@ -42,8 +41,8 @@ contains
       logical, intent(in) :: tabulate
       !> Clock of the blocks of the first range: overlaps, then forces
       type(block_clock_t), intent(out) :: clock
-      !> Names a contact that must stop the run; on entry an error of the step, after which nothing is done
-      type(error_t), allocatable, intent(inout) :: error
+      !> On entry an error of the step, after which nothing is done
+      type(error_t), allocatable, intent(in) :: error
       integer(ip) :: ends(0:most_ranges), last(0:most_ranges)
       integer(ip) :: n, r, k
 
@@ -90,7 +89,6 @@ contains
          self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(sum(ranges%n_degenerate), lp)
       end associate
       if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%loop%incidence)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%loop%flagged, self%step, error)
    end subroutine loop_over_contacts
 
    !> Make room for the results of n ranges.

@@ -24,7 +24,7 @@ contains
 
       call kinetic_energy(simulation%bodies, simulation%comm, value)
       call row%set('kinetic_energy', value, 'J/m', 'mean kinetic energy of a free body')
-      call unbalanced_force(simulation%settings%forces%gravity, simulation%contacts, simulation%comm, &
+      call unbalanced_force(simulation%forces%gravity, simulation%contacts, simulation%comm, &
                             simulation%bodies, simulation%loop%force_sums, value)
       call row%set('unbalanced_force', defined(value), '1', &
                    'mean total force on a free body over the mean force of a contact')

@@ -242,7 +242,7 @@ contains
             call check_step(monitor, simulation, .false., log, error)
             if (failed(error)) return
          end do
-         associate (last => monitor%list(size(monitor%list))%guard)
+         associate (last => simulation%guards(size(simulation%guards))%guard)
             counts(n) = int(last%warning%count, ip)
          end associate
       end do

@@ -265,7 +265,7 @@ contains
          if (allocated(bodies%image)) values(2) = values(2) &
             - m*(gravity(1)*(real(bodies%image(s, 1), wp)*bodies%cell%size(1)) &
                  + gravity(2)*(real(bodies%image(s, 2), wp)*bodies%cell%size(2)))
-         if (allocated(bodies%slid)) values(2) = values(2) - m*(gravity(1)*bodies%slid(s))
+         if (allocated(bodies%shear_offset)) values(2) = values(2) - m*(gravity(1)*bodies%shear_offset(s))
          values(3:4) = m*v
          values(5) = m*(x(1)*v(2) - x(2)*v(1)) + spin
          values(6) = m*(abs(v(1)) + abs(v(2)))

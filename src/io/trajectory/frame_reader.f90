@@ -20,7 +20,7 @@ module polydem_frame_reader
       !> Displacement [m] and velocity [m/s] of the copy above
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Whether a checkpoint has the cells that bodies have crossed, and the shifts of the borders that they crossed
-      logical :: has_images = .false., has_slides = .false.
+      logical :: has_images = .false., has_shear_offset = .false.
       !> Greatest number of pieces of a body, in a checkpoint
       integer(ip) :: most_pieces = 1_ip
    end type surroundings_t
@@ -201,7 +201,7 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       found%has_images = file%has('/bodies/image_x', error)
-      found%has_slides = file%has('/bodies/slid', error)
+      found%has_shear_offset = file%has('/bodies/shear_offset', error)
       if (file%has('/run/cell', error)) then
          call file%read('/run/cell', values, error)
       else if (file%has('/frames/cell_size', error)) then

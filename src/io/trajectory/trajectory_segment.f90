@@ -4,8 +4,8 @@
 !>                  piece (if bodies have several pieces): number of the piece of each vertex within its body, from 0
 !>     /cell        low, size: periodic cell (in a periodic cell)
 !>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
-!>                  image (in a periodic cell), slid, shift and jump (in a sheared cell), cell_low and cell_size (if the
-!>                  size of the cell is stress-controlled)
+!>                  image (in a periodic cell), shear_offset, shift and jump (in a sheared cell), cell_low and
+!>                  cell_size (if the size of the cell is stress-controlled)
 !>     /walls       id; force and torque on the fixed bodies, and present if walls vanish: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
 !>                  normal, length, force, couple: one row per contact (optional)

@@ -275,7 +275,7 @@ contains
       character(len=:), allocatable :: text
 
       text = ''
-      associate (gravity => simulation%settings%forces%gravity)
+      associate (gravity => simulation%forces%gravity)
          if (abs(gravity(1)) + abs(gravity(2)) > 0.0_wp) text = ', gravity'
       end associate
    end function gravity_text

@@ -6,12 +6,12 @@ module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse, two_pi
    use polydem_entry_warnings, only: warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
-   use polydem_motion_check, only: shorter_step
+   use polydem_guard, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_parts, only: parts_t
    use polydem_regions, only: is_beside_walls
-   use polydem_settings, only: grains_settings_t, settings_t
+   use polydem_settings, only: forces_settings_t, grains_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
@@ -59,7 +59,7 @@ contains
       call warn_of_overlaps(simulation, measures, warnings)
       call warn_of_speeds(simulation, measures, warnings)
       call warn_of_fixed_overlaps(simulation, warnings)
-      call warn_of_regions(simulation%settings, warnings)
+      call warn_of_regions(simulation%settings, simulation%forces, warnings)
       call warn_of_tables(simulation, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       call warn_of_entries(simulation, measures, warnings)
@@ -124,8 +124,10 @@ contains
    end subroutine warn_of_units
 
    !> Warn of groups of grains that will meet no wall.
-   subroutine warn_of_regions(settings, warnings)
+   subroutine warn_of_regions(settings, forces, warnings)
       type(settings_t), intent(in) :: settings
+      !> Parameters of the forces at the start
+      type(forces_settings_t), intent(in) :: forces
       type(text_t), allocatable, intent(inout) :: warnings(:)
       type(parts_t) :: parts
       integer :: k
@@ -135,9 +137,9 @@ contains
       if (any([(moves_away(settings%motion(k)%kind), k=1, size(settings%motion))]) .or. size(settings%load) > 0) return
       parts%walls = settings%wall
       do k = 1, size(settings%grains)
-         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, settings%grains(k)))) call add(warnings, &
-            'the grains of group '//settings%grains(k)%name//' start beside all walls and will meet none; move '// &
-            'their region between or above the walls')
+         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, forces, settings%grains(k)))) &
+            call add(warnings, 'the grains of group '//settings%grains(k)%name//' start beside '// &
+                     'all walls and will meet none; move their region between or above the walls')
       end do
    end subroutine warn_of_regions
 
@@ -150,25 +152,25 @@ contains
 
    !> Whether the grains of a group go against and along each axis: by gravity, with their velocity, or through the
    !> copies of a periodic cell, (axis, sense)
-   pure function ways_of(settings, group) result(ways)
+   pure function ways_of(settings, forces, group) result(ways)
       type(settings_t), intent(in) :: settings
+      !> Parameters of the forces at the start
+      type(forces_settings_t), intent(in) :: forces
       type(grains_settings_t), intent(in) :: group
       logical :: ways(2, 2)
       integer :: axis, k
 
-      associate (forces => settings%forces)
-         ways(:, 1) = group%velocity < 0.0_wp .or. forces%gravity < 0.0_wp
-         ways(:, 2) = group%velocity > 0.0_wp .or. forces%gravity > 0.0_wp
-         do k = 1, size(settings%stage)
-            if (size(settings%stage(k)%gravity) /= 2) cycle
-            ways(:, 1) = ways(:, 1) .or. settings%stage(k)%gravity < 0.0_wp
-            ways(:, 2) = ways(:, 2) .or. settings%stage(k)%gravity > 0.0_wp
-         end do
-         do axis = 1, 2
-            ways(axis, :) = ways(axis, :) .or. group%speed > 0.0_wp .or. abs(forces%turn_rate) > 0.0_wp .or. &
-               abs(forces%shake(axis)) > 0.0_wp .or. scan(settings%cell%periodic, 'xy'(axis:axis)) > 0
-         end do
-      end associate
+      ways(:, 1) = group%velocity < 0.0_wp .or. forces%gravity < 0.0_wp
+      ways(:, 2) = group%velocity > 0.0_wp .or. forces%gravity > 0.0_wp
+      do k = 1, size(settings%stage)
+         if (size(settings%stage(k)%gravity) /= 2) cycle
+         ways(:, 1) = ways(:, 1) .or. settings%stage(k)%gravity < 0.0_wp
+         ways(:, 2) = ways(:, 2) .or. settings%stage(k)%gravity > 0.0_wp
+      end do
+      do axis = 1, 2
+         ways(axis, :) = ways(axis, :) .or. group%speed > 0.0_wp .or. abs(forces%turn_rate) > 0.0_wp .or. &
+            abs(forces%shake(axis)) > 0.0_wp .or. scan(settings%cell%periodic, 'xy'(axis:axis)) > 0
+      end do
    end function ways_of
 
    !> Warn of a time step that is unstable as soon as bodies touch.

@@ -9,12 +9,12 @@ module polydem_scene_measures
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
-   use polydem_motion_check, only: greatest_displacement, place_of
+   use polydem_motion_tests, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
    use polydem_run_duration, only: longest_run
    use polydem_simulation, only: simulation_t
-   use polydem_stability_check, only: find_stable_step
+   use polydem_step_guard, only: find_stable_step
    use polydem_strings, only: to_text
    use polydem_wall, only: greatest_wall_speed
    use polydem_walls, only: walls_t
@@ -118,9 +118,9 @@ contains
                                                                                longest_run(s%settings)))
          end do
          call measure_sides(comm, s%bodies, s%walls, measures%sides)
-         gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
+         gravity = hypotenuse(s%forces%gravity(1), s%forces%gravity(2))
          if (gravity > 0.0_wp) then
-            down = abs(s%settings%forces%gravity)/gravity
+            down = abs(s%forces%gravity)/gravity
             measures%potential = gravity*measures%mass(3)*along(measures%extent)
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
             measures%static_depth = [measures%mass(1)*gravity, measures%density(2)*gravity &

@@ -104,7 +104,7 @@ contains
          largest = 0.0_wp
          if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
          call reduce_to_greatest(self%comm, largest)
-         call set_cell_mass(usual, self%settings%forces%stiffness, largest(1), bodies%cell%load)
+         call set_cell_mass(usual, self%forces%stiffness, largest(1), bodies%cell%load)
       end associate
    end subroutine set_controlled_masses
 
@@ -131,7 +131,7 @@ contains
 
       if (allocated(error) .or. .not. allocated(self%bodies%cell%load)) return
       associate (cell => self%bodies%cell)
-         least = (least_steps*self%dt)**2*self%settings%forces%stiffness*maxval(cell%size)/minval(cell%size)
+         least = (least_steps*self%dt)**2*self%forces%stiffness*maxval(cell%size)/minval(cell%size)
          if (cell%load%axis(1)%mass >= least) return
          call raise(error, input_error, place_of(self%settings, 'cell', 'mass')//': ''mass'' in &cell: the size '// &
                     'of a cell of '//to_text(cell%load%axis(1)%mass)//' kg/m oscillates faster than the time step '// &
@@ -158,7 +158,7 @@ contains
       end do
       associate (bodies => self%bodies, walls => self%walls)
          call walls%named%find_slots(bodies)
-         call set_masses(walls%loads, walls%named, bodies, usual, self%settings%forces%stiffness)
+         call set_masses(walls%loads, walls%named, bodies, usual, self%forces%stiffness)
       end associate
    end subroutine prepare_loads
 
@@ -219,7 +219,7 @@ contains
       character(len=:), allocatable :: key, place, remedy
 
       if (self%dt*self%body_forces%rate() <= greatest_change) return
-      associate (forces => self%settings%forces, rate => self%body_forces%rate())
+      associate (forces => self%forces, rate => self%body_forces%rate())
          key = 'drag'
          if (two_pi*abs(forces%turn_rate) >= rate) key = 'turn_rate'
          if (two_pi*forces%shake_frequency >= rate) key = 'shake_frequency'

@@ -133,7 +133,7 @@ contains
       if (allocated(self%bodies%cell%load) .and. allocated(self%law%constraint)) call raise(error, input_error, &
          place_of(self%settings, 'cell', 'stress_controlled')//': ''stress_controlled'' in &cell cannot be '// &
          'combined with this ''friction'' in &forces, which does not know how the cell grows; use cundall_strack')
-      if (self%settings%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
+      if (self%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
          input_error, place_of(self%settings, 'forces', 'local_damping')//': ''local_damping'' in &forces cannot '// &
          'be combined with this ''friction'', whose forces depend on the motion without it; use drag')
    end subroutine check_constraint

@@ -35,15 +35,15 @@ contains
          if (expected%speed > 0.0_wp) return
          call find_start_speed(self%settings%source, self%bodies, self%comm, start)
          fall = 0.0_wp
-         call consider_fall(self, self%settings%forces%gravity, fall)
+         call consider_fall(self, self%forces%gravity, fall)
          do k = 1, size(self%settings%stage)
             if (size(self%settings%stage(k)%gravity) == 2) then
                call consider_fall(self, self%settings%stage(k)%gravity, fall)
             else
-               call consider_fall(self, self%stages%gravity, fall)
+               call consider_fall(self, self%settings%forces%gravity, fall)
             end if
          end do
-         associate (forces => self%settings%forces)
+         associate (forces => self%forces)
             if (forces%shake_frequency > 0.0_wp) &
                fall = fall + hypotenuse(forces%shake(1), forces%shake(2))/(pi*forces%shake_frequency)
          end associate
@@ -96,7 +96,7 @@ contains
       integer :: k
 
       turned = gravity
-      do k = 1, merge(4, 1, abs(self%settings%forces%turn_rate) > 0.0_wp)
+      do k = 1, merge(4, 1, abs(self%forces%turn_rate) > 0.0_wp)
          call find_fall_speed(self%settings, self%bodies, size(self%walls%driven) > 0, self%comm, turned, speed)
          greatest = max(greatest, speed)
          turned = [-turned(2), turned(1)]

@@ -24,8 +24,9 @@ module polydem_relaxation
    use polydem_new_neighbours, only: new_neighbours
    use polydem_source_locations, only: place_of
    use polydem_redistribution, only: have_boxes_left, redistribute
-   use polydem_simulation, only: relaxation_t, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
+   use polydem_start_findings, only: relaxation_t
    use polydem_strings, only: to_text
    implicit none
    private

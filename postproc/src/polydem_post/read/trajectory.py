@@ -371,7 +371,10 @@ class Trajectory:
         kept = rows.kept(row, bodies["id"])
         if kept is not None:
             bodies = _chosen(kept, bodies)
-        crossed = [name for name in ("image", "slid") if name in frames]
+        crossed = [name for name in ("image", "shear_offset") if name in frames]
+        if "slid" in frames:
+            raise ResultError(f"{segment.path}: is of an earlier revision: `frames/slid` has the name "
+                              "`frames/shear_offset` today; run the scene again")
         columns = {name: rows.column(name, row) for name in (*GROWING, *crossed)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
         jump = self._jump(bodies["cell_size"][1], float(segment.times[row])) if "shift" in frames else 0.0
