@@ -91,7 +91,7 @@ module polydem_bodies
       real(wp), allocatable :: thickness(:)
       !> Whether the body is one of a wall that has vanished: it has no box and meets nothing, (slot); not allocated if
       !> no wall vanishes
-      logical, allocatable :: gone(:)
+      logical, allocatable :: removed(:)
    end type bodies_t
 
 contains

@@ -5,7 +5,7 @@ module polydem_gone_bodies
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip, lp
    use polydem_sort, only: place_in
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall, only: wall_t
    use polydem_wall_names, only: find_wall_names
    implicit none
    private
@@ -22,7 +22,7 @@ contains
       !> Names the file and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(wall_bodies_t), allocatable :: walls(:)
+      type(wall_t), allocatable :: walls(:)
       integer(ip), allocatable :: flags(:), id(:)
       logical, allocatable :: is_gone(:)
       integer(ip) :: j, k, row

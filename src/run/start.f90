@@ -14,7 +14,6 @@ module polydem_start
    use polydem_start_forces, only: start_forces
    use polydem_start_simulation, only: place_bodies
    use polydem_thread_choice, only: choose_threads, thread_choice_t
-   use polydem_wall_bodies, only: wall_bodies_t
    implicit none
    private
    public :: new_simulation
@@ -35,15 +34,14 @@ contains
       !> Time step of an earlier attempt, which the simulation keeps unless the settings have one [s]; 0: there is none
       real(wp), intent(in), optional :: former_step
       class(communicator_t), allocatable :: ranks
-      type(wall_bodies_t), allocatable :: of_result(:)
 
       call choose_communicator(ranks, comm)
       if (present(former_step)) self%dt = former_step
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       if (settings%scene%name == 'result') then
-         call read_start(settings, ranks, self%bodies, of_result, error)
-         if (.not. allocated(error)) call assign_walls(settings, self%bodies, of_result, self%walls, error)
+         call read_start(settings, ranks, self%bodies, self%walls%wall, error)
+         if (.not. allocated(error)) call assign_walls(settings, self%bodies, self%walls, error)
       else
          call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size)
       end if

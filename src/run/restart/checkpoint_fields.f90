@@ -16,13 +16,11 @@ module polydem_checkpoint_fields
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_monitor, only: serialize_monitor, monitor_t
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
-   use polydem_packed_state, only: find_walls
    use polydem_participants, only: serialize_participants
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_wall, only: hash_of_tables
    implicit none
    private
    public :: attempts_t, serialize_run, serialize_progress, read_pairs
@@ -53,12 +51,10 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
-      integer(ip), allocatable :: former(:)
 
       call serialize_global(serializer, simulation, attempts, monitor)
       associate (s => simulation)
          if (serializer%is_reading) then
-            former = s%bodies%id
             call read_bodies(serializer, s%comm, s%bodies)
             if (.not. allocated(serializer%error)) call s%motion%integrator%start(s%bodies)
          else
@@ -79,7 +75,6 @@ contains
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
-         call find_walls(former, s%bodies%id, s%walls%driven)
          call rebuild_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
@@ -91,8 +86,7 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
-      integer(lp), allocatable :: tables(:)
-      integer :: k
+      integer(lp) :: tables
 
       call serialize_progress(serializer, simulation%step, attempts)
       call serialize_monitor(monitor, serializer)
@@ -100,11 +94,8 @@ contains
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
-         associate (driven => s%walls%driven)
-            tables = [(hash_of_tables(driven(k)), k=1, size(driven))]
-            if (any(tables /= 0_lp)) call serializer%match('/run/motion_tables', tables, '1', &
-                                                           'hash of the tables of motions')
-         end associate
+         tables = s%walls%hash_of_tables()
+         if (tables /= 0_lp) call serializer%match('/run/motion_tables', [tables], '1', 'hash of the tables of motions')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
                            'ended, contacts without direction')

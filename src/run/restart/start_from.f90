@@ -29,7 +29,7 @@ module polydem_start_from
    use polydem_start_materials, only: translate_materials
    use polydem_strings, only: quoted, suggestion, to_text
    use polydem_vanishing_walls, only: find_release
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall, only: wall_t
    use polydem_wall_names, only: find_material_names, find_wall_names
    implicit none
    private
@@ -151,7 +151,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(inout) :: bodies
       !> Walls of the groups &wall
-      type(wall_bodies_t), allocatable, intent(out) :: named(:)
+      type(wall_t), allocatable, intent(out) :: named(:)
       !> Names the entry and what is wrong with the result
       type(error_t), allocatable, intent(inout) :: error
       type(origin_t) :: origin
@@ -230,9 +230,9 @@ contains
       type(settings_t), intent(in) :: settings
       !> File of the result
       character(len=*), intent(in) :: path
-      type(wall_bodies_t), allocatable, intent(inout) :: named(:)
+      type(wall_t), allocatable, intent(inout) :: named(:)
       type(error_t), allocatable, intent(inout) :: error
-      type(wall_bodies_t), allocatable :: former(:)
+      type(wall_t), allocatable :: former(:)
       character(len=:), allocatable :: names(:)
       integer :: j, k, place
 

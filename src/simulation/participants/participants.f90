@@ -27,7 +27,7 @@ contains
       type(participant_item_t), allocatable :: list(:)
 
       allocate (list(0))
-      if (self%walls%named%has_gates()) call add(vanishing_walls_t())
+      if (self%walls%has_gates()) call add(vanishing_walls_t())
       if (allocated(self%traffic)) call add(sources_and_sinks_t())
       if (self%bodies%cell%is_sheared .or. allocated(self%bodies%cell%load)) &
          call add(moving_cell_t(needs_all_ranks=allocated(self%bodies%cell%load)))
