@@ -2,9 +2,11 @@
 !> that motions drive.
 module polydem_assign_walls
    use polydem_bodies, only: bodies_t
+   use polydem_check_loads, only: act_together, one_of_them
    use polydem_driven, only: along_angle, new_window
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
+   use polydem_motion, only: motion_item_t, motion_limits_t
    use polydem_motion_factory, only: new_motion
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: motion_settings_t, settings_t
@@ -16,6 +18,9 @@ module polydem_assign_walls
    implicit none
    private
    public :: assign_walls
+
+   !> Directions of a load, by their numbers
+   character(len=*), parameter :: directions(3) = [character(len=5) :: 'x', 'y', 'angle']
 
 contains
 
@@ -42,6 +47,7 @@ contains
       end do
       slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
       call find_motions(settings, bodies, slots, walls, moves, error)
+      if (.not. allocated(error)) call check_directions(settings, walls%motions, moves, error)
       if (allocated(error)) return
       do k = 1_ip, walls%n_named
          call set_pivot(settings, slots, moves, walls, walls%wall(k))
@@ -84,7 +90,7 @@ contains
       s = findloc(slots, wall%slots(1), dim=1)
       if (s == 0) return
       do k = size(walls%motions), 1, -1
-         if (moves(k, s) .and. walls%motions(k)%motion%has_pivot()) wall%pivot = walls%motions(k)%motion%pivot
+         if (moves(k, s) .and. walls%motions(k)%motion%has_pivot) wall%pivot = walls%motions(k)%motion%pivot
       end do
    end subroutine set_pivot
 
@@ -200,7 +206,7 @@ contains
                error%message = origin_of(settings, motion)//error%message
                return
             end if
-            call new_motion(settings, motion, walls%motions(k)%motion, error)
+            call new_motion(settings, k, walls%motions(k)%motion, error)
             if (allocated(error)) return
          end associate
       end do
@@ -209,6 +215,33 @@ contains
          if (allocated(error)) return
       end do
    end subroutine find_motions
+
+   !> Check that no motion moves a wall along the direction of a load at the same time.
+   subroutine check_directions(settings, motions, moves, error)
+      type(settings_t), intent(in) :: settings
+      type(motion_item_t), intent(in) :: motions(:)
+      !> Whether a motion, or a load behind the motions, moves each fixed body
+      logical, intent(in) :: moves(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      type(motion_limits_t) :: limits
+      integer :: k, l
+
+      do l = 1, size(settings%load)
+         do k = 1, size(motions)
+            associate (load => settings%load(l), motion => settings%motion(k))
+               limits = motions(k)%motion%limits()
+               if (.not. limits%moves(index_of(load%direction, directions))) cycle
+               if (.not. any(moves(k, :) .and. moves(size(motions) + l, :))) cycle
+               if (.not. act_together([load%start, load%end], load%stage, [motion%start, motion%end], motion%stage)) &
+                  cycle
+               call raise(error, input_error, place_of(settings, 'load.'//load%name, 'direction')// &
+                          ': ''direction'' in &load '//load%name//' is one in which the motion '//motion%name// &
+                          ' moves the same wall'//one_of_them)
+               return
+            end associate
+         end do
+      end do
+   end subroutine check_directions
 
    !> Set the parameters of the loads.
    pure subroutine assign_loads(settings, walls, loads)
@@ -224,7 +257,7 @@ contains
          associate (given => settings%load(k), load => loads(k))
             load%name = given%name
             load%wall = number_of(given%wall, walls)
-            load%direction = index_of(given%direction, [character(len=5) :: 'x', 'y', 'angle'])
+            load%direction = index_of(given%direction, directions)
             load%force = given%force
             if (load%direction == along_angle) load%force = given%torque
             load%stress = given%stress

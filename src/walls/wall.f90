@@ -106,14 +106,14 @@ contains
 
       if (size(self%motions) /= 1 .or. size(self%loads) > 0) then
          call reset_bodies(self, bodies)
-      else if (.not. motions(self%motions(1))%motion%starts_from_reference()) then
+      else if (.not. motions(self%motions(1))%motion%starts_from_reference) then
          call reset_bodies(self, bodies)
       end if
       is_moved = .false.
       do k = 1, size(self%motions)
          associate (motion => motions(self%motions(k))%motion)
             if (time < motion%start) cycle
-            if (is_moved .or. .not. motion%starts_from_reference()) then
+            if (is_moved .or. .not. motion%starts_from_reference) then
                call carry_bodies(motion, time, self%slots, bodies)
             else
                call pose_bodies(motion, time, self%slots, self%position, self%angle, bodies)

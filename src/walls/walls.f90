@@ -4,9 +4,11 @@ module polydem_walls
    use polydem_bodies, only: bodies_t
    use polydem_bodies_in_cell, only: put_into_cell
    use polydem_communicator, only: communicator_t
+   use polydem_driven, only: along_angle
    use polydem_exact_sum, only: exact_sum_t
+   use polydem_hash, only: mix_word
    use polydem_kinds, only: ip, lp, wp
-   use polydem_motion, only: motion_item_t
+   use polydem_motion, only: motion_item_t, motion_limits_t
    use polydem_serializer, only: serializer_t
    use polydem_wall, only: have_same_drivers, wall_t
    use polydem_wall_load, only: carry_walls, correct_loads, energies_of_loads, n_energies, predict_loads, wall_load_t
@@ -162,6 +164,8 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Duration of the run, in which a motion can move a body away from the pivot of the next one [s]
       real(wp), intent(in) :: duration
+      type(motion_limits_t) :: limits
+      ! Greatest distance of a point from the pivot, displacement so far, and speed
       real(wp) :: arm, reach, speed
       integer :: j, k, w
 
@@ -176,7 +180,14 @@ contains
                   if (have_same_drivers(self%wall(j), self%wall(w))) arm = max(arm, &
                      self%wall(j)%reference_arm(motion%pivot, bodies))
                end do
-               call motion%add_bounds(arm, duration, speed, reach)
+               limits = motion%limits()
+               speed = speed + limits%spin*(arm + reach) + limits%speed
+               ! A point can come to the other side of the pivot.
+               if (limits%moves(along_angle)) reach = reach + 2.0_wp*(arm + reach)
+               ! The start in a stage is not known yet.
+               if (.not. limits%shift < huge(1.0_wp)) limits%shift = limits%speed &
+                  *max(0.0_wp, min(duration, motion%end) - merge(0.0_wp, motion%start, motion%stage > 0_ip))
+               reach = reach + limits%shift
             end associate
          end do
          greatest = max(greatest, speed)
@@ -190,7 +201,11 @@ contains
 
       hash = 0_lp
       do k = 1, size(self%motions)
-         hash = self%motions(k)%motion%hash_of_table(hash)
+         associate (own => self%motions(k)%motion%hash)
+            if (own == 0_lp) cycle
+            if (hash /= 0_lp) hash = mix_word(hash, own)
+            if (hash == 0_lp) hash = own
+         end associate
       end do
    end function hash_of_tables
 

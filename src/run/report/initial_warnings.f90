@@ -82,7 +82,8 @@ contains
 
       do k = 1, size(simulation%walls%motions)
          associate (motion => simulation%walls%motions(k)%motion, duration => simulation%settings%integrate%duration)
-            last = motion%rests_from()
+            if (.not. motion%rests_after < huge(1.0_wp)) cycle
+            last = motion%start + motion%rests_after
             if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
                'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
                to_text(duration, 3)//' s; from then on its bodies rest in the last pose')

@@ -7,6 +7,7 @@ module polydem_enter_cell
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
+   use polydem_motion, only: motion_limits_t
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: cell_settings_t, settings_t
    use polydem_simulation, only: simulation_t
@@ -243,12 +244,14 @@ contains
       !> Number of the wall
       integer, intent(in) :: w
       integer, intent(in) :: direction
+      type(motion_limits_t) :: limits
       integer :: k
 
       moves = .false.
       if (allocated(walls%loads)) moves = any(walls%loads(walls%wall(w)%loads)%direction == direction)
       do k = 1, size(walls%wall(w)%motions)
-         moves = moves .or. walls%motions(walls%wall(w)%motions(k))%motion%moves(direction)
+         limits = walls%motions(walls%wall(w)%motions(k))%motion%limits()
+         moves = moves .or. limits%moves(direction)
       end do
    end function moves
 
