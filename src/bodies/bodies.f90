@@ -89,8 +89,8 @@ module polydem_bodies
       !> Twice the least distance of an edge from the centre of mass; of several pieces the least, each about its own
       !> centroid [m]
       real(wp), allocatable :: thickness(:)
-      !> Whether the body is one of a wall that has vanished: it has no box and meets nothing, (slot); not allocated if
-      !> no wall vanishes
+      !> Whether the body is one of a wall that was removed: it has no box and meets nothing, (slot); not allocated if
+      !> no wall is removed
       logical, allocatable :: removed(:)
    end type bodies_t
 

@@ -3,7 +3,7 @@
 !> A body of common size has one box, the bounds of its turned vertices. The box of a much larger body, such as a long
 !> wall, would overlap half the scene. A large body is therefore cut into tiles (`polydem_body_tiles`), and each tile
 !> has its own box. The body itself remains one polygon. The pieces of a body of several pieces are such tiles, or are
-!> cut into tiles like a body. A body of a wall that has vanished has no box.
+!> cut into tiles like a body. A body of a wall that was removed has no box.
 !>
 !> If two polygons share a point, their boxes share a point. For whole bodies this follows from the monotonicity of
 !> rounding. Boxes of tiles are padded by a few rounding errors of the size of the body: no gap opens between them when

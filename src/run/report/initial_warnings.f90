@@ -15,7 +15,7 @@ module polydem_initial_warnings
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
-   use polydem_vanished_walls, only: warn_of_vanished
+   use polydem_removed_walls, only: warn_of_removed
    use polydem_wall_warnings, only: add
    implicit none
    private
@@ -63,7 +63,7 @@ contains
       call warn_of_tables(simulation, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       call warn_of_entries(simulation, measures, warnings)
-      call warn_of_vanished(simulation%settings, warnings)
+      call warn_of_removed(simulation%settings, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
       if (undamped /= '') call add(warnings, undamped)

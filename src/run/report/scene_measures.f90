@@ -95,7 +95,6 @@ contains
       real(wp), allocatable :: thinner(:)
       real(wp) :: gravity, down(2)
       integer(ip) :: slot
-      integer :: k
 
       associate (s => simulation, comm => simulation%comm)
          measures%fixed_boxes = count(s%search%boxes%fixed(:s%search%boxes%n), kind=lp)

@@ -2,7 +2,7 @@
 !>
 !> A checkpoint has the whole state. The run goes on from it as the run of the result would, at time 0: contact history,
 !> accelerations and state of the integrator are those of the checkpoint. The forces at time 0 follow from a copy of the
-!> history, since evaluating them changes it. A frame has poses and velocities only. Bodies of walls that have vanished
+!> history, since evaluating them changes it. A frame has poses and velocities only. Bodies of walls that were removed
 !> are left out.
 module polydem_start_from
    use polydem_bodies, only: bodies_t, turn_bodies
@@ -19,7 +19,7 @@ module polydem_start_from
    use polydem_exchange_bodies, only: find_leaving
    use polydem_file_system, only: exists, is_folder
    use polydem_frame_reader, only: find_frame, list_frame, read_surroundings, surroundings_t
-   use polydem_gone_bodies, only: find_gone_rows, rows_of
+   use polydem_removed_bodies, only: find_removed_rows, rows_of
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_result_files, only: checkpoint_path, n_checkpoints, segment_path
@@ -28,7 +28,7 @@ module polydem_start_from
    use polydem_source_locations, only: place_of
    use polydem_start_materials, only: translate_materials
    use polydem_strings, only: quoted, suggestion, to_text
-   use polydem_vanishing_walls, only: find_release
+   use polydem_wall_removal, only: find_release
    use polydem_wall, only: wall_t
    use polydem_wall_names, only: find_material_names, find_wall_names
    implicit none
@@ -47,8 +47,8 @@ module polydem_start_from
       character(len=:), allocatable :: note
       !> What it says of its periodic cell and of pieces
       type(surroundings_t) :: around
-      !> Rows of the bodies of a checkpoint that belong to walls that have vanished, ascending
-      integer(ip), allocatable :: gone(:)
+      !> Rows of the bodies of a checkpoint that belong to walls that were removed, ascending
+      integer(ip), allocatable :: removed(:)
    end type origin_t
 
 contains
@@ -93,7 +93,7 @@ contains
          call find_checkpoint(folder, origin, error)
       end if
       if (.not. allocated(error)) call read_surroundings(origin%path, origin%row, origin%around, error)
-      if (.not. (allocated(error) .or. origin%is_frame)) call find_gone_rows(origin%path, origin%gone, error)
+      if (.not. (allocated(error) .or. origin%is_frame)) call find_removed_rows(origin%path, origin%removed, error)
       if (allocated(error)) call blame(settings, error)
    end subroutine find_origin
 
@@ -180,7 +180,7 @@ contains
          call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
-         call read_bodies(file, comm, bodies, origin%gone)
+         call read_bodies(file, comm, bodies, origin%removed)
          call file%close(error)
          if (.not. allocated(error)) call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
       end if
@@ -281,7 +281,7 @@ contains
       call open_start(simulation, file, origin, error)
       if (allocated(error) .or. origin%is_frame) return
       ! Here the state of the integrator is only tried.
-      call file%choose_rows('/bodies/', rows_of(simulation%bodies%global_index, origin%gone))
+      call file%choose_rows('/bodies/', rows_of(simulation%bodies%global_index, origin%removed))
       call simulation%motion%integrator%serialize(file)
       if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
          call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
@@ -321,7 +321,7 @@ contains
       if (allocated(error) .or. origin%is_frame) return
       associate (bodies => simulation%bodies)
          before = bodies
-         call file%choose_rows('/bodies/', rows_of(bodies%global_index, origin%gone))
+         call file%choose_rows('/bodies/', rows_of(bodies%global_index, origin%removed))
          ! The result may have had no cell, or one without shear.
          if (.not. origin%around%has_images .and. allocated(bodies%image)) deallocate (bodies%image)
          if (.not. origin%around%has_slides .and. allocated(bodies%slid)) deallocate (bodies%slid)

@@ -1,4 +1,4 @@
-!> Walls that vanish: from a step on they meet nothing.
+!> Removal of walls: from a step on they meet nothing.
 !>
 !> Their bodies stay where they are among all bodies, so that slots, files and identifiers keep their order, but they
 !> have no boxes any more (`removed` of `bodies_t`). No finder and no contact ever sees them; the pair list is built
@@ -6,7 +6,7 @@
 !>
 !> The elastic energy of the contacts with such a wall leaves with it. The energy balance takes it from its start, so
 !> that no work of the elastic forces appears.
-module polydem_vanishing_walls
+module polydem_wall_removal
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
@@ -18,20 +18,20 @@ module polydem_vanishing_walls
    use polydem_wall_energy, only: release_energy
    implicit none
    private
-   public :: vanishing_walls_t, find_release
+   public :: wall_removal_t, find_release
 
-   !> Walls that vanish at a time
-   type, extends(participant_t) :: vanishing_walls_t
+   !> Walls that are removed at a time
+   type, extends(participant_t) :: wall_removal_t
    contains
       procedure :: change_bodies
       procedure :: serialize
-   end type vanishing_walls_t
+   end type wall_removal_t
 
 contains
 
-   !> Remove the walls that vanish at the present time.
+   !> Remove the walls whose time has come.
    subroutine change_bodies(self, simulation, error)
-      class(vanishing_walls_t), intent(inout) :: self
+      class(wall_removal_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
 
@@ -46,9 +46,9 @@ contains
       end associate
    end subroutine change_bodies
 
-   !> Serialize which walls have vanished, and the energy of those that vanish before the next step.
+   !> Serialize which walls were removed, and the energy of those that are removed before the next step.
    subroutine serialize(self, simulation, serializer)
-      class(vanishing_walls_t), intent(inout) :: self
+      class(wall_removal_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
       class(serializer_t), intent(inout) :: serializer
 
@@ -58,8 +58,8 @@ contains
       call simulation%walls%serialize_gates(serializer)
    end subroutine serialize
 
-   !> Find the elastic energy of the contacts of walls that vanish before the next step, unless a restart has read it.
-   !> Collective.
+   !> Find the elastic energy of the contacts of walls that are removed before the next step, unless a restart has read
+   !> it. Collective.
    subroutine find_release(self)
       !> The simulation between two steps; `released` of its walls is set
       type(simulation_t), intent(inout) :: self
@@ -83,4 +83,4 @@ contains
       self%walls%released = sums(1)%value()
    end subroutine find_release
 
-end module polydem_vanishing_walls
+end module polydem_wall_removal
