@@ -89,9 +89,9 @@ module polydem_bodies
       !> Twice the least distance of an edge from the centre of mass; of several pieces the least, each about its own
       !> centroid [m]
       real(wp), allocatable :: thickness(:)
-      !> Whether the body is one of a wall that has vanished: it has no box and meets nothing, (slot); not allocated if
-      !> no wall vanishes
-      logical, allocatable :: gone(:)
+      !> Whether the body is one of a wall that was removed: it has no box and meets nothing, (slot); not allocated if
+      !> no wall is removed
+      logical, allocatable :: removed(:)
    end type bodies_t
 
 contains

@@ -50,7 +50,7 @@ contains
       if (allocated(error)) return
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', run%scene_hash)
-      call run%provenance%set('walls', wall_names_text(run%simulation%walls%named%wall))
+      call run%provenance%set('walls', wall_names_text(run%simulation%walls%wall))
       if (size(settings%material) > 0) call run%provenance%set('materials', material_names_text(settings))
       if (settings%scene%bodies_file /= '') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return

@@ -20,7 +20,6 @@ module polydem_start
    use polydem_start_simulation, only: place_bodies
    use polydem_start_state, only: recall_history
    use polydem_thread_choice, only: choose_threads, thread_choice_t
-   use polydem_wall_bodies, only: wall_bodies_t
    implicit none
    private
    public :: build_start, new_simulation
@@ -60,15 +59,14 @@ contains
       !> Time step of a previous start, which the simulation keeps unless the settings have one [s]; 0: there is none
       real(wp), intent(in), optional :: former_step
       class(communicator_t), allocatable :: ranks
-      type(wall_bodies_t), allocatable :: of_result(:)
 
       call choose_communicator(ranks, comm)
       if (present(former_step)) self%dt = former_step
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       if (settings%scene%name == 'result') then
-         call read_start_bodies(settings, ranks, self%bodies, of_result, error)
-         if (.not. allocated(error)) call assign_walls(settings, self%bodies, of_result, self%walls, error)
+         call read_start_bodies(settings, ranks, self%bodies, self%walls%wall, error)
+         if (.not. allocated(error)) call assign_walls(settings, self%bodies, self%walls, error)
       else
          call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size)
       end if

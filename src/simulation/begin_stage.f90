@@ -11,9 +11,9 @@ module polydem_begin_stage
    use polydem_run_stages, only: run_stages_t
    use polydem_settings, only: forces_settings_t, settings_t, stage_settings_t
    use polydem_simulation, only: acts_on_all, simulation_t
-   use polydem_sort, only: place_in
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
+   use polydem_wall, only: number_of
    implicit none
    private
    public :: prepare_stages, begin_stage, continue_stages, check_reference, find_last_steps, wall_vector
@@ -78,16 +78,14 @@ contains
    !> Let force law, other forces, free flight, motions and loads use the parameters of the present stage.
    subroutine use_parameters(self)
       type(simulation_t), intent(inout) :: self
-      integer :: j, k
+      integer :: k
 
       call self%law%scale_friction(self%stages%friction_scale)
       call self%body_forces%configure(self%forces)
       call self%motion%flight%start(self%forces%gravity, acts_on_all(self), self%motion%integrator, &
                                     self%bodies%n)
-      do j = 1, size(self%walls%driven)
-         do k = 1, size(self%walls%driven(j)%motions)
-            call set_window(self%stages, self%dt, self%walls%driven(j)%motions(k)%motion)
-         end do
+      do k = 1, size(self%walls%motions)
+         call set_window(self%stages, self%dt, self%walls%motions(k)%motion)
       end do
       if (allocated(self%bodies%cell%load)) call set_window(self%stages, self%dt, self%bodies%cell%load%axis)
       if (.not. allocated(self%walls%loads)) return
@@ -176,14 +174,14 @@ contains
       associate (stage => self%settings%stage(self%stages%number), reference => self%stages%reference)
          if (stage%until /= 'strain') return
          place = place_of(self%settings, 'stage.'//stage%name, 'wall')//': stage '//stage%name
-         do k = 1, size(self%walls%named%wall)
-            associate (wall => self%walls%named%wall(k))
+         do k = 1, size(self%walls%wall)
+            associate (wall => self%walls%wall(k))
                if (wall%name /= stage%wall .and. wall%name /= stage%opposite) cycle
-               if (wall%is_gone) call raise(error, input_error, place//' measures its strain from the wall '// &
+               if (wall%is_removed) call raise(error, input_error, place//' measures its strain from the wall '// &
                                             wall%name//', which has vanished')
                radius = 0.0_wp
-               do j = 1, size(wall%id)
-                  radius = max(radius, self%bodies%radius(place_in(self%bodies%id, wall%id(j))))
+               do j = 1, size(wall%slots)
+                  radius = max(radius, self%bodies%radius(wall%slots(j)))
                end do
                if (all(abs(reference) <= coincident*radius)) call raise(error, input_error, place//': the centres '// &
                   'of the walls '//stage%wall//' and '//stage%opposite//' coincide, so their distance is no length '// &
@@ -209,17 +207,14 @@ contains
       pure function centre_of(name) result(centre)
          character(len=*), intent(in) :: name
          real(wp) :: centre(2)
-         integer :: j, k
+         integer :: j
 
          centre = 0.0_wp
-         do k = 1, size(self%walls%named%wall)
-            if (self%walls%named%wall(k)%name /= name) cycle
-            associate (id => self%walls%named%wall(k)%id)
-               do j = 1, size(id)
-                  centre = centre + path_of(self%bodies, place_in(self%bodies%id, id(j)))/real(size(id), wp)
-               end do
-            end associate
-         end do
+         associate (slots => self%walls%wall(number_of(name, self%walls%wall))%slots)
+            do j = 1, size(slots)
+               centre = centre + path_of(self%bodies, slots(j))/real(size(slots), wp)
+            end do
+         end associate
       end function centre_of
 
    end function wall_vector

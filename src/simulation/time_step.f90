@@ -98,9 +98,10 @@ contains
       call place_images(self%search%maker%images, self%bodies%cell, self%search%boxes)
       if (.not. allocated(self%domain%reference)) return
       has_left = has_left .or. self%domain%is_off(self%bodies%cell)
-      do k = 1, size(self%walls%driven)
+      do k = 1, size(self%walls%wall)
+         if (.not. self%walls%wall(k)%is_driven()) cycle
          has_left = has_left .or. .not. have_boxes_within( &
-            self%search%maker, self%walls%driven(k)%slots, self%search%boxes, self%domain%rank_bounds%zone, &
+            self%search%maker, self%walls%wall(k)%slots, self%search%boxes, self%domain%rank_bounds%zone, &
             self%domain%reference)
       end do
    end subroutine bound_others

@@ -141,7 +141,7 @@ contains
       if (failed(error)) return
       call steps(simulation, 1875, error)
       if (failed(error)) return
-      associate (slots => simulation%walls%driven(1)%slots)
+      associate (slots => simulation%walls%wall(1)%slots)
          print '(a, 2es24.16)', 'orbit', (simulation%bodies%position(:, slots(1)) &
                                           - ([0.0_wp, -0.5_wp] + 0.5_wp*[-root - 1.0_wp, root]))/0.5_wp
       end associate

@@ -210,8 +210,8 @@ contains
       call file%write('/walls/force', force, error, 'N/m', 'forces of the other bodies on each fixed body', &
                       rows=one_row)
       call file%write('/walls/torque', torque, error, 'N', 'torques about its centre of mass', rows=one_row)
-      if (allocated(bodies%gone)) call file%write( &
-         '/walls/present', int(pack(merge(0, 1, bodies%gone(:bodies%n)), bodies%fixed(:bodies%n)), bp), error, '1', &
+      if (allocated(bodies%removed)) call file%write( &
+         '/walls/present', int(pack(merge(0, 1, bodies%removed(:bodies%n)), bodies%fixed(:bodies%n)), bp), error, '1', &
          '1: present, 0: its wall has vanished', rows=one_row)
    end subroutine add_walls
 

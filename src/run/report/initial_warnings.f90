@@ -15,7 +15,7 @@ module polydem_initial_warnings
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
-   use polydem_vanished_walls, only: warn_of_vanished
+   use polydem_removed_walls, only: warn_of_removed
    use polydem_wall_warnings, only: add
    implicit none
    private
@@ -63,7 +63,7 @@ contains
       call warn_of_tables(simulation, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       call warn_of_entries(simulation, measures, warnings)
-      call warn_of_vanished(simulation%settings, warnings)
+      call warn_of_removed(simulation%settings, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
       if (undamped /= '') call add(warnings, undamped)
@@ -78,18 +78,16 @@ contains
       type(simulation_t), intent(in) :: simulation
       type(text_t), allocatable, intent(inout) :: warnings(:)
       real(wp) :: last
-      integer :: j, k
+      integer :: k
 
-      do k = 1, size(simulation%walls%driven)
-         do j = 1, size(simulation%walls%driven(k)%motions)
-            associate (motion => simulation%walls%driven(k)%motions(j)%motion, &
-                       duration => simulation%settings%integrate%duration)
-               last = motion%rests_from()
-               if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
-                  'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
-                  to_text(duration, 3)//' s; from then on its bodies rest in the last pose')
-            end associate
-         end do
+      do k = 1, size(simulation%walls%motions)
+         associate (motion => simulation%walls%motions(k)%motion, duration => simulation%settings%integrate%duration)
+            if (.not. motion%rests_after < huge(1.0_wp)) cycle
+            last = motion%start + motion%rests_after
+            if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
+               'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
+               to_text(duration, 3)//' s; from then on its bodies rest in the last pose')
+         end associate
       end do
    end subroutine warn_of_tables
 
@@ -277,8 +275,8 @@ contains
 
       associate (bodies => simulation%bodies)
          is_loaded = spread(.false., 1, bodies%n)
-         do k = 1, size(simulation%walls%driven)
-            if (simulation%walls%driven(k)%is_loaded) is_loaded(simulation%walls%driven(k)%slots) = .true.
+         do k = 1, size(simulation%walls%wall)
+            if (size(simulation%walls%wall(k)%loads) > 0) is_loaded(simulation%walls%wall(k)%slots) = .true.
          end do
          call find_fixed_overlaps(bodies, is_loaded, n, first, second, area, place)
          if (n == 0_lp) return

@@ -16,7 +16,6 @@ module polydem_scene_measures
    use polydem_simulation, only: simulation_t
    use polydem_step_guard, only: find_stable_step
    use polydem_strings, only: to_text
-   use polydem_wall, only: greatest_wall_speed
    use polydem_walls, only: walls_t
    implicit none
    private
@@ -96,7 +95,6 @@ contains
       real(wp), allocatable :: thinner(:)
       real(wp) :: gravity, down(2)
       integer(ip) :: slot
-      integer :: k
 
       associate (s => simulation, comm => simulation%comm)
          measures%fixed_boxes = count(s%search%boxes%fixed(:s%search%boxes%n), kind=lp)
@@ -113,10 +111,7 @@ contains
          call greatest_displacement(s%bodies, s%moving(:s%n_moving), s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
-         do k = 1, size(s%walls%driven)
-            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls%driven(k), s%bodies%radius, &
-                                                                               longest_run(s%settings)))
-         end do
+         measures%wall_speed = s%walls%greatest_speed(s%bodies, longest_run(s%settings))
          call measure_sides(comm, s%bodies, s%walls, measures%sides)
          gravity = hypotenuse(s%forces%gravity(1), s%forces%gravity(2))
          if (gravity > 0.0_wp) then
@@ -280,11 +275,11 @@ contains
       do k = 1, size(walls%loads)
          associate (load => walls%loads(k))
             if (load%direction /= along_angle) cycle
-            line = walls%named%centre(load%wall, bodies) - load%pivot
+            line = walls%wall(load%wall)%centre(bodies) - load%pivot
             if (.not. any(abs(line) > 0.0_wp)) cycle
             line = line/hypotenuse(line(1), line(2))
             ! The wall: it begins on one side of the pivot.
-            bounds = distances(bodies, walls%named%wall(load%wall)%slots, load%pivot, line)
+            bounds = distances(bodies, walls%wall(load%wall)%slots, load%pivot, line)
             if (bounds(3, 1) < -0.1_wp*bounds(3, 2)) cycle
             sides(3, k) = bounds(2, 1) - bounds(1, 1)
             bounds = distances(bodies, bodies%free, load%pivot, line)

@@ -16,13 +16,11 @@ module polydem_checkpoint_fields
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_monitor, only: serialize_guards
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
-   use polydem_packed_state, only: find_walls
    use polydem_participants, only: serialize_participants
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_wall, only: hash_of_tables
    implicit none
    private
    public :: restarts_t, serialize_run, serialize_progress, read_pairs
@@ -52,12 +50,10 @@ contains
       !> stored state without contacts, which the next step computes
       type(simulation_t), intent(inout) :: simulation
       type(restarts_t), intent(inout) :: restarts
-      integer(ip), allocatable :: former(:)
 
       call serialize_global(serializer, simulation, restarts)
       associate (s => simulation)
          if (serializer%is_reading) then
-            former = s%bodies%id
             call read_bodies(serializer, s%comm, s%bodies)
             if (.not. allocated(serializer%error)) call s%motion%integrator%start(s%bodies)
          else
@@ -78,7 +74,6 @@ contains
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
-         call find_walls(former, s%bodies%id, s%walls%driven)
          call rebuild_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
@@ -89,8 +84,7 @@ contains
       class(serializer_t), intent(inout) :: serializer
       type(simulation_t), intent(inout) :: simulation
       type(restarts_t), intent(inout) :: restarts
-      integer(lp), allocatable :: tables(:)
-      integer :: k
+      integer(lp) :: tables
 
       call serialize_progress(serializer, simulation%step, restarts)
       call serialize_guards(simulation, serializer)
@@ -98,11 +92,8 @@ contains
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [restarts%scene], '1', 'hash of the bodies at the start')
-         associate (driven => s%walls%driven)
-            tables = [(hash_of_tables(driven(k)), k=1, size(driven))]
-            if (any(tables /= 0_lp)) call serializer%match('/run/motion_tables', tables, '1', &
-                                                           'hash of the tables of motions')
-         end associate
+         tables = s%walls%hash_of_tables()
+         if (tables /= 0_lp) call serializer%match('/run/motion_tables', [tables], '1', 'hash of the tables of motions')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
                            'ended, contacts without direction')

@@ -18,6 +18,7 @@ module polydem_restart
    use polydem_strings, only: quoted, to_text
    use polydem_timers, only: timers_t
    use polydem_wall_places, only: check_places
+   use polydem_wall_record, only: clear_record
    implicit none
    private
    public :: restart_state_t, find_restart, restore, remove_surplus_files, serialize_previous
@@ -377,7 +378,7 @@ contains
          call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, s%bodies%cell)
          if (.not. s%comm%is_root()) then
             s%sums = 0_lp
-            call s%walls%record%clear()
+            call clear_record(s%walls)
             s%timers = timers_t()
             s%search%neighbours%finder%work%value = 0_lp
             s%search%neighbours%finder%work%seconds = 0.0_dp

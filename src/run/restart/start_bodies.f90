@@ -1,5 +1,5 @@
 !> The bodies of a run that starts from a result. A checkpoint has the whole state, a frame poses and velocities only.
-!> Bodies of walls that have vanished are left out.
+!> Bodies of walls that were removed are left out.
 module polydem_start_bodies
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_body_list, only: body_list_t, new_bodies
@@ -14,7 +14,7 @@ module polydem_start_bodies
    use polydem_start_materials, only: translate_materials
    use polydem_start_origin, only: blame, find_origin, origin_t
    use polydem_strings, only: quoted, suggestion, to_text
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall, only: wall_t
    use polydem_wall_names, only: find_material_names, find_wall_names
    implicit none
    private
@@ -29,7 +29,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(inout) :: bodies
       !> Walls of the groups &wall
-      type(wall_bodies_t), allocatable, intent(out) :: named(:)
+      type(wall_t), allocatable, intent(out) :: named(:)
       !> Names the entry and what is wrong with the result
       type(error_t), allocatable, intent(inout) :: error
       type(origin_t) :: origin
@@ -58,7 +58,7 @@ contains
          call file%open(origin%path, error, comm)
          if (allocated(error)) return
          call file%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
-         call read_bodies(file, comm, bodies, origin%gone)
+         call read_bodies(file, comm, bodies, origin%removed)
          call file%close(error)
          if (.not. allocated(error)) call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
       end if
@@ -108,9 +108,9 @@ contains
       type(settings_t), intent(in) :: settings
       !> File of the result
       character(len=*), intent(in) :: path
-      type(wall_bodies_t), allocatable, intent(inout) :: named(:)
+      type(wall_t), allocatable, intent(inout) :: named(:)
       type(error_t), allocatable, intent(inout) :: error
-      type(wall_bodies_t), allocatable :: former(:)
+      type(wall_t), allocatable :: former(:)
       character(len=:), allocatable :: names(:)
       integer :: j, k, place
 

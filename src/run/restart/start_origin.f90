@@ -5,7 +5,7 @@ module polydem_start_origin
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists, is_folder
    use polydem_frame_reader, only: find_frame, read_surroundings, surroundings_t
-   use polydem_gone_bodies, only: find_gone_rows
+   use polydem_removed_bodies, only: find_removed_rows
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_result_files, only: checkpoint_path, n_checkpoints, segment_path
    use polydem_settings, only: settings_t
@@ -27,8 +27,8 @@ module polydem_start_origin
       character(len=:), allocatable :: note
       !> What it says of its periodic cell and of pieces
       type(surroundings_t) :: around
-      !> Rows of the bodies of a checkpoint that belong to walls that have vanished, ascending
-      integer(ip), allocatable :: gone(:)
+      !> Rows of the bodies of a checkpoint that belong to walls that were removed, ascending
+      integer(ip), allocatable :: removed(:)
    end type origin_t
 
 contains
@@ -73,7 +73,7 @@ contains
          call find_checkpoint(folder, origin, error)
       end if
       if (.not. allocated(error)) call read_surroundings(origin%path, origin%row, origin%around, error)
-      if (.not. (allocated(error) .or. origin%is_frame)) call find_gone_rows(origin%path, origin%gone, error)
+      if (.not. (allocated(error) .or. origin%is_frame)) call find_removed_rows(origin%path, origin%removed, error)
       if (allocated(error)) call blame(settings, error)
    end subroutine find_origin
 

@@ -13,12 +13,12 @@ module polydem_start_state
    use polydem_enter_cell, only: join_copies
    use polydem_errors, only: error_t
    use polydem_exchange_bodies, only: find_leaving
-   use polydem_gone_bodies, only: rows_of
+   use polydem_removed_bodies, only: rows_of
    use polydem_kinds, only: ip, lp
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_simulation, only: simulation_t
    use polydem_start_origin, only: blame, find_origin, origin_t
-   use polydem_vanishing_walls, only: find_release
+   use polydem_wall_removal, only: find_release
    implicit none
    private
    public :: recall_history, return_to_state
@@ -38,7 +38,7 @@ contains
       call open_start(simulation, file, origin, error)
       if (allocated(error) .or. origin%is_frame) return
       ! Here the state of the integrator is only tried.
-      call file%choose_rows('/bodies/', rows_of(simulation%bodies%global_index, origin%gone))
+      call file%choose_rows('/bodies/', rows_of(simulation%bodies%global_index, origin%removed))
       call simulation%motion%integrator%serialize(file)
       if (simulation%settings%integrate%scheme /= 'velocity_verlet') &
          call file%match('/run/time_step', simulation%dt, 's', 'time step, which this scheme keeps')
@@ -78,7 +78,7 @@ contains
       if (allocated(error) .or. origin%is_frame) return
       associate (bodies => simulation%bodies)
          before = bodies
-         call file%choose_rows('/bodies/', rows_of(bodies%global_index, origin%gone))
+         call file%choose_rows('/bodies/', rows_of(bodies%global_index, origin%removed))
          ! The result may have had no cell, or one without shear.
          if (.not. origin%around%has_images .and. allocated(bodies%image)) deallocate (bodies%image)
          if (.not. origin%around%has_shear_offset .and. allocated(bodies%shear_offset)) deallocate (bodies%shear_offset)

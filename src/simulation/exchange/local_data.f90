@@ -32,8 +32,8 @@ contains
       !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
       real(wp), intent(in), optional :: median_diameter
 
-      call self%walls%named%find_slots(self%bodies)
-      call self%walls%named%mark_gone(self%bodies)
+      call self%walls%find_slots(self%bodies)
+      call self%walls%mark_removed(self%bodies)
       call find_folds(self%bodies)
       call self%law%measure(self%bodies)
       if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
@@ -48,7 +48,7 @@ contains
       call self%motion%flight%start(self%forces%gravity, acts_on_all(self), self%motion%integrator, &
                                     self%bodies%n)
       self%loop%incidence = incidence_t()
-      call list_moving(self%bodies, self%walls%driven, self%moving, self%n_moving)
+      call list_moving(self%bodies, self%walls%wall, self%moving, self%n_moving)
       associate (choice => self%settings%boxes)
          call new_box_maker(self%search%maker, self%bodies, choice%largest_ratio, choice%margin, self%search%boxes, &
                             error, median_diameter, self%domain%margin)
@@ -87,7 +87,7 @@ contains
    !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.
    subroutine list_moving(bodies, walls, moving, n_moving)
       type(bodies_t), intent(in) :: bodies
-      !> Fixed bodies with prescribed motions or loads
+      !> All walls, of which motions or loads drive some
       type(wall_t), intent(in) :: walls(:)
       integer(ip), allocatable, intent(out) :: moving(:)
       !> Number of slots before the halo bodies
@@ -97,7 +97,7 @@ contains
 
       moving = bodies%free
       do k = 1, size(walls)
-         moving = [moving, walls(k)%slots]
+         if (walls(k)%is_driven()) moving = [moving, walls(k)%slots]
       end do
       n_moving = size(moving, kind=ip)
       moving = [moving, pack([(s, s=1_ip, bodies%n)], bodies%in_halo)]

@@ -240,7 +240,7 @@ contains
 
       numbers = contact_numbers(self%bodies%n, self%loop%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
-      if (allocated(self%walls%loads)) wall_mobility = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      if (allocated(self%walls%loads)) wall_mobility = wall_mobilities(self%walls%loads, self%walls%wall, self%bodies)
       table = self%motion%integrator%stability()
       call stable_step_of_contacts(self%law, table, self%bodies, numbers, self%contacts, steps(1), limiting(1), &
                                    wall_mobility)

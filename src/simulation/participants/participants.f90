@@ -9,7 +9,7 @@ module polydem_participants
    use polydem_simulation, only: participant_item_t, participant_t, simulation_t
    use polydem_sources_and_sinks, only: sources_and_sinks_t
    use polydem_undirected_contacts, only: undirected_contacts_t
-   use polydem_vanishing_walls, only: vanishing_walls_t
+   use polydem_wall_removal, only: wall_removal_t
    implicit none
    private
    public :: choose_participants, start_participants, change_bodies, begin_step, need_table, check_contacts, &
@@ -24,7 +24,7 @@ contains
       type(participant_item_t), allocatable :: list(:)
 
       allocate (list(0))
-      if (self%walls%named%has_gates()) call add(vanishing_walls_t())
+      if (self%walls%has_gates()) call add(wall_removal_t())
       if (allocated(self%traffic)) call add(sources_and_sinks_t())
       if (self%bodies%cell%is_sheared .or. allocated(self%bodies%cell%load)) &
          call add(moving_cell_t(needs_all_ranks=allocated(self%bodies%cell%load)))
@@ -64,7 +64,7 @@ contains
       call move_alloc(list, self%participants)
    end subroutine start_participants
 
-   !> Let bodies enter, leave or vanish between two steps. Collective; all ranks get the same error.
+   !> Let bodies enter or leave between two steps. Collective; all ranks get the same error.
    subroutine change_bodies(self, error)
       type(simulation_t), intent(inout) :: self
       !> Allocated if one of them fails

@@ -157,8 +157,8 @@ contains
          end associate
       end do
       associate (bodies => self%bodies, walls => self%walls)
-         call walls%named%find_slots(bodies)
-         call set_masses(walls%loads, walls%named, bodies, usual, self%forces%stiffness)
+         call walls%find_slots(bodies)
+         call set_masses(walls%loads, walls%wall, bodies, usual, self%forces%stiffness)
       end associate
    end subroutine prepare_loads
 
@@ -260,13 +260,13 @@ contains
 
       greatest = 0.0_wp
       if (.not. allocated(self%walls%loads)) return
-      mobility = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      mobility = wall_mobilities(self%walls%loads, self%walls%wall, self%bodies)
       do k = 1, size(self%walls%loads)
-         associate (w => self%walls%loads(k)%wall)
-            extent(:, 1) = self%walls%named%extent(w, 1, self%bodies)
-            extent(:, 2) = self%walls%named%extent(w, 2, self%bodies)
-            if (size(self%walls%named%wall(w)%slots) > 0) greatest = max(greatest, &
-               mobility(self%walls%named%wall(w)%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
+         associate (wall => self%walls%wall(self%walls%loads(k)%wall))
+            extent(:, 1) = wall%extent(1, self%bodies)
+            extent(:, 2) = wall%extent(2, self%bodies)
+            if (size(wall%slots) > 0) greatest = max(greatest, &
+               mobility(wall%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
          end associate
       end do
    end function mobility_of_walls

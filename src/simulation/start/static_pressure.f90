@@ -49,7 +49,7 @@ contains
             call consider_weight(self, self%settings%forces%gravity, density(1))
          end if
       end do
-      call self%walls%named%find_slots(self%bodies)
+      call self%walls%find_slots(self%bodies)
       do k = 1, size(self%settings%load)
          associate (load => self%settings%load(k))
             call consider(self, load_pressure(self, load, k), 'of &load '//load%name)
@@ -143,7 +143,7 @@ contains
          if (axis == along_angle) return
          force = abs(load%force)
          if (load%weight) force = force + load%mass*abs(self%forces%gravity(axis))
-         extent = self%walls%named%extent(wall, 3 - axis, self%bodies)
+         extent = self%walls%wall(wall)%extent(3 - axis, self%bodies)
          if (extent(2) > extent(1)) pressure = pressure + force/(extent(2) - extent(1))
       end associate
    end function load_pressure
