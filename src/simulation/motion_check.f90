@@ -1,7 +1,8 @@
 !> Checks of every step: non-finite states, displacements that are too large, and contacts without direction.
 module polydem_motion_check
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_contact_block, only: is_degenerate
+   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: far, dp, ip, lp, wp
    use polydem_settings, only: guards_settings_t, integrate_settings_t
@@ -320,9 +321,9 @@ contains
 
       if (contacts%n_degenerate == 0_ip .or. degenerate == 'push') return
       do c = 1_ip, contacts%n
-         if (is_degenerate(contacts, c)) exit
+         if (is_degenerate(contacts%row(c))) exit
       end do
-      associate (i => contacts%first(c), j => contacts%second(c))
+      associate (i => contacts%row(c)%first, j => contacts%row(c)%second)
          call raise(error, run_error, 'step '//to_text(step)//': the contact of the bodies '//to_text(bodies%id(i))// &
                     ' and '//to_text(bodies%id(j))//' near ('//to_text(bodies%position(1, i))//', '// &
                     to_text(bodies%position(2, i))//') m has no direction: one body is inside the other, or they '// &

@@ -201,7 +201,8 @@ contains
       if (failed(error)) return
       call measure_condition(simulation)
       call set_sample_columns(simulation, row)
-      print '(a, 2es24.16)', 'greatest_speed', row%value(index_of('greatest_speed', row%name)), simulation%stages%value
+      print '(a, 2es24.16)', 'greatest_speed', row%value(index_of('greatest_speed', row%label%name)), &
+         simulation%stages%value
    end subroutine speed_up
 
    !> Print the area of a triangle.

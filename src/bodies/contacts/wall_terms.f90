@@ -2,8 +2,8 @@
 module polydem_wall_terms
    use polydem_bodies, only: bodies_t
    use polydem_cell, only: copies_along_y
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
+   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contacts, only: contacts_t, load_block
    use polydem_force_sums, only: contact_terms_t, term_of, terms_of_block
    use polydem_kinds, only: ip, wp
    use polydem_term_list, only: append_term, reserve_terms, term_list_t

@@ -41,8 +41,8 @@ contains
 
       if (simulation%loop%passing_pair == 0_ip .or. allocated(error)) return
       associate (s => simulation, flagged => simulation%loop%flagged)
-         found = findloc(flagged%pair(:flagged%n), s%loop%passing_pair, dim=1)
-         place = place_of(s%bodies, flagged%first(found), flagged%second(found))
+         found = findloc(flagged%row(:flagged%n)%pair, s%loop%passing_pair, dim=1)
+         place = place_of(s%bodies, flagged%row(found)%first, flagged%row(found)%second)
          call self%warning%respond(self%choice, 'step '//to_text(s%step)//': '// &
                                    passing_text(s%bodies, flagged, s%bodies%radius, found, &
                                                 shorter_step(s%settings%integrate)), error, -real(place, dp))
