@@ -54,7 +54,7 @@ contains
          character(len=*), intent(in) :: name
          character(len=:), allocatable :: value
 
-         associate (number => real(row%value(index_of(name, row%name)), wp))
+         associate (number => real(row%value(index_of(name, row%label%name)), wp))
             value = '-'
             if (ieee_is_finite(number)) value = to_text(number, 3)
          end associate

@@ -212,8 +212,8 @@ contains
       force_of_top = 0.0_wp
       associate (contacts => simulation%contacts, slot => simulation%walls%wall(4)%slots(1))
          do c = 1, int(contacts%n)
-            if (contacts%first(c) == slot) force_of_top = force_of_top + force_along(c)
-            if (contacts%second(c) == slot) force_of_top = force_of_top - force_along(c)
+            if (contacts%row(c)%first == slot) force_of_top = force_of_top + force_along(c)
+            if (contacts%row(c)%second == slot) force_of_top = force_of_top - force_along(c)
          end do
       end associate
 

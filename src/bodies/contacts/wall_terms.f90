@@ -3,8 +3,8 @@ module polydem_wall_terms
    use polydem_bodies, only: bodies_t
    use polydem_bodies_in_cell, only: path_of
    use polydem_cell, only: copies_along_y
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
+   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contacts, only: contacts_t, load_block
    use polydem_force_sums, only: contact_terms_t, n_terms, of_normal, of_tangential, sum_torque, sum_x, sum_y, &
       term_of, terms_of_block
    use polydem_kinds, only: ip, wp

@@ -166,15 +166,15 @@ contains
       real(wp), intent(inout) :: channels(n_channels)
       !> Wall channels of the free body
       real(wp), intent(inout) :: wall_channels(n_wall_channels)
-      real(wp) :: fx, fy, twist, torque
+      real(wp) :: fx, fy, couple, torque
 
       call add_term(bodies%velocity(:, wall), bodies%angular_velocity(wall), term, weight, channels)
       fx = term(sum_x(of_normal)) + term(sum_x(of_tangential))
       fy = term(sum_y(of_normal)) + term(sum_y(of_tangential))
-      twist = term(sum_torque(of_normal)) + term(sum_torque(of_tangential))
+      couple = term(sum_torque(of_normal)) + term(sum_torque(of_tangential))
       associate (x => bodies%position(:, wall), v => bodies%velocity(:, wall), w => bodies%angular_velocity(wall))
-         torque = (x(1)*fy - x(2)*fx) + twist
-         wall_channels(1) = wall_channels(1) - weight*((fx*v(1) + fy*v(2)) + twist*w)
+         torque = (x(1)*fy - x(2)*fx) + couple
+         wall_channels(1) = wall_channels(1) - weight*((fx*v(1) + fy*v(2)) + couple*w)
       end associate
       wall_channels(2) = wall_channels(2) - weight*fx
       wall_channels(3) = wall_channels(3) - weight*fy

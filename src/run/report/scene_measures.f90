@@ -163,7 +163,7 @@ contains
       end do
       counts(3) = measures%boxes
       do c = 1_ip, contacts%n
-         if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+         if (.not. owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) cycle
          counts(4) = counts(4) + 1_lp
          if (depth_share(contacts, thinner, c) > limit) counts(5) = counts(5) + 1_lp
       end do
@@ -212,18 +212,18 @@ contains
       if (worst > 0_ip) then
          measures%depth_share = depth_share(contacts, thinner, worst)
          measures%deepest = depth_text(bodies, contacts, thinner, worst)
-         place = place_of(bodies, contacts%first(worst), contacts%second(worst))
+         place = place_of(bodies, contacts%row(worst)%first, contacts%row(worst)%second)
       end if
       do c = 1_ip, contacts%n
-         depth = contacts%depth(c)
+         depth = contacts%row(c)%depth
          if (depth <= greatest) cycle
          greatest = depth
          worst = c
       end do
       if (worst > 0_ip) then
-         longest = place_of(bodies, contacts%first(worst), contacts%second(worst))
+         longest = place_of(bodies, contacts%row(worst)%first, contacts%row(worst)%second)
          measures%longest_depth = to_text(greatest, 3)//' m between the bodies '// &
-            to_text(bodies%id(contacts%first(worst)))//' and '//to_text(bodies%id(contacts%second(worst)))
+            to_text(bodies%id(contacts%row(worst)%first))//' and '//to_text(bodies%id(contacts%row(worst)%second))
       end if
       call keep_greatest(comm, measures%depth_share, place, measures%deepest)
       call keep_greatest(comm, greatest, longest, measures%longest_depth)

@@ -111,8 +111,8 @@ contains
       associate (contacts => self%contacts, bodies => self%bodies)
          if (self%loop%walls%energy_is_known) then
             do c = 1_ip, contacts%n
-               if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
-               if (stays(contacts%first(c)) .and. stays(contacts%second(c))) cycle
+               if (.not. owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) cycle
+               if (stays(contacts%row(c)%first) .and. stays(contacts%row(c)%second)) cycle
                call released(1)%add(energy_of_contact(contacts, c))
             end do
          end if

@@ -60,7 +60,7 @@ contains
       call set_local_limits(self)
    end subroutine rebuild_local_data
 
-   !> Empty a table of contacts, and give it the columns that the law needs.
+   !> Empty a table of contacts, and let it measure overlaps as the law needs it.
    subroutine fit_table(law, contacts)
       type(force_law_t), intent(in) :: law
       type(contacts_t), intent(out) :: contacts
@@ -68,7 +68,7 @@ contains
       contacts%measure = law%overlap_measure
       contacts%energy_is_known = law%energy_is_known
       contacts%has_cohesion = law%needs_cohesion
-      contacts%has_twist = law%needs_twist
+      contacts%has_couple = law%needs_couple
       call reserve_contacts(contacts, 0_ip)
    end subroutine fit_table
 

@@ -67,7 +67,7 @@ contains
 
       allocate (terms(contacts%n), source=0.0_wp)
       do c = 1_ip, contacts%n
-         if (owns_pair(bodies, contacts%first(c), contacts%second(c))) &
+         if (owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) &
             terms(c) = energy_of_contact(contacts, c)
       end do
       call sum_exactly(comm, terms, stored)

@@ -162,8 +162,8 @@ contains
       worst = 0_ip
       associate (flagged => self%loop%flagged, bodies => self%bodies)
          do c = 1_ip, flagged%n
-            if (.not. flagged%length(c)*flagged%inverse_length(c)*(bodies%inverse_mass(flagged%first(c)) &
-                + bodies%inverse_mass(flagged%second(c))) > self%loop%flag_limits%soft) cycle
+            if (.not. flagged%row(c)%length*flagged%row(c)%inverse_length*(bodies%inverse_mass(flagged%row(c)%first) &
+                + bodies%inverse_mass(flagged%row(c)%second)) > self%loop%flag_limits%soft) cycle
             this = self%dt/stable_step_alone(self%law, self%motion%integrator%stability(), bodies, flagged, c)
             if (this <= share) cycle
             share = this
@@ -211,10 +211,10 @@ contains
 
       text = '. Reduce dt'
       if (c == 0_ip .or. self%settings%integrate%dt > 0.0_wp) return
-      mobility = self%bodies%inverse_mass(contacts%first(c)) + self%bodies%inverse_mass(contacts%second(c))
+      mobility = self%bodies%inverse_mass(contacts%row(c)%first) + self%bodies%inverse_mass(contacts%row(c)%second)
       ! The energy of the contact is as yet that of the approach, and that of the spring.
-      speed = sqrt((contacts%rate(c)/contacts%length(c))**2 &
-                   + contacts%elastic(c)*contacts%area(c)/contacts%length(c)*mobility)
+      speed = sqrt((contacts%row(c)%rate/contacts%row(c)%length)**2 &
+                   + contacts%row(c)%elastic*contacts%row(c)%area/contacts%row(c)%length*mobility)
       text = '. Its bodies met at about '//to_text(speed, 3)//' m/s; dt is chosen for '// &
          to_text(self%expected%speed, 3)//' m/s ('//self%expected%origin//'). '
       ! The step of bodies of several pieces does not depend on the speed.
@@ -275,11 +275,12 @@ contains
       character(len=:), allocatable :: text
 
       if (critical == 0_ip .or. dt <= warn_share*stable) return
-      associate (i => contacts%first(critical), j => contacts%second(critical))
+      associate (i => contacts%row(critical)%first, j => contacts%row(critical)%second)
          text = 'step '//to_text(step)//': dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)// &
             ' of the stable step, set by the contact of the bodies '//to_text(bodies%id(i))//' and '// &
-            to_text(bodies%id(j))//' at ('//to_text(bodies%position(1, i) + contacts%arm_first(1, critical))//', '// &
-            to_text(bodies%position(2, i) + contacts%arm_first(2, critical))//') m'//remedy
+            to_text(bodies%id(j))//' at ('// &
+            to_text(bodies%position(1, i) + contacts%row(critical)%arm_first(1))//', '// &
+            to_text(bodies%position(2, i) + contacts%row(critical)%arm_first(2))//') m'//remedy
       end associate
       if (dt > stable) then
          call raise(error, run_error, text)

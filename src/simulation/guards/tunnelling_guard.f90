@@ -57,8 +57,8 @@ contains
 
       if (simulation%loop%passing_pair == 0_ip .or. allocated(error)) return
       associate (s => simulation, flagged => simulation%loop%flagged)
-         found = findloc(flagged%pair(:flagged%n), s%loop%passing_pair, dim=1)
-         place = place_of(s%bodies, flagged%first(found), flagged%second(found))
+         found = findloc(flagged%row(:flagged%n)%pair, s%loop%passing_pair, dim=1)
+         place = place_of(s%bodies, flagged%row(found)%first, flagged%row(found)%second)
          call self%warning%respond(self%choice, 'step '//to_text(s%step)//': '// &
                                    passing_text(s%bodies, flagged, s%bodies%radius, found, &
                                                 shorter_step(s%settings%integrate)), error, -real(place, dp))
@@ -80,11 +80,11 @@ contains
       character(len=*), intent(in) :: shorter_step
       character(len=:), allocatable :: text
 
-      associate (i => contacts%first(c), j => contacts%second(c))
+      associate (i => contacts%row(c)%first, j => contacts%row(c)%second)
          if (bodies%pieces%most > 1_ip) then
             text = 'of the contact of the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
-               to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
-               to_text(bodies%position(2, i) + contacts%arm_first(2, c))// &
+               to_text(bodies%position(1, i) + contacts%row(c)%arm_first(1))//', '// &
+               to_text(bodies%position(2, i) + contacts%row(c)%arm_first(2))// &
                ') m a piece has its centre inside the other, or the direction changed by more than 90 degrees'
          else if (centre_inside(bodies, radius, i, j)) then
             text = centre_text(i, j)
@@ -92,8 +92,8 @@ contains
             text = centre_text(j, i)
          else
             text = 'the contact of the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
-               to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
-               to_text(bodies%position(2, i) + contacts%arm_first(2, c))// &
+               to_text(bodies%position(1, i) + contacts%row(c)%arm_first(1))//', '// &
+               to_text(bodies%position(2, i) + contacts%row(c)%arm_first(2))// &
                ') m changed its direction by more than 90 degrees in the step'
          end if
       end associate

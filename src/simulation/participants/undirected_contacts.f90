@@ -1,6 +1,6 @@
 !> Stop at contacts without direction, as a participant of the steps: with `degenerate = 'stop'` in &overlap.
 module polydem_undirected_contacts
-   use polydem_contacts, only: is_degenerate
+   use polydem_contact_block, only: is_degenerate
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: ip
    use polydem_motion_tests, only: place_error
@@ -28,9 +28,9 @@ contains
       associate (unused => self, bodies => simulation%bodies, contacts => simulation%loop%flagged)
          if (contacts%n_degenerate == 0_ip) return
          do c = 1_ip, contacts%n
-            if (is_degenerate(contacts, c)) exit
+            if (is_degenerate(contacts%row(c))) exit
          end do
-         associate (i => contacts%first(c), j => contacts%second(c))
+         associate (i => contacts%row(c)%first, j => contacts%row(c)%second)
             call raise(error, run_error, 'step '//to_text(simulation%step)//': the contact of the bodies '// &
                        to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' near ('// &
                        to_text(bodies%position(1, i))//', '//to_text(bodies%position(2, i))//') m has no '// &

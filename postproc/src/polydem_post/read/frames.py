@@ -392,7 +392,8 @@ class _Given:
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
     """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0.
 
-    Columns of file layouts before 7 have no length and no couple, and the area gradient as normal.
+    Columns of file layouts before 7 have no length and no couple, and the area gradient as normal. Columns of other
+    names become those of `others`.
     """
     first, second = (_index_of(frame, columns[name]) for name in ("first", "second"))
     branch = frame.position[first] - frame.position[second]
@@ -406,8 +407,10 @@ def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
         way = np.where(length[:, None] > 0.0, columns["normal"], -branch)
         columns = {**columns, "length": length, "normal": unit_vectors(way), "couple": np.full(len(first), np.nan)}
     return Contacts(
-        **{name: columns[name] for name in CONTACT_FIELDS}, first_index=first, second_index=second, branch=branch,
-        first_arm=first_arm, second_arm=second_arm, with_fixed=frame.fixed[first] | frame.fixed[second])
+        **{name: columns[name] for name in CONTACT_FIELDS},
+        others={name: values for name, values in columns.items() if name not in CONTACT_FIELDS},
+        first_index=first, second_index=second, branch=branch, first_arm=first_arm, second_arm=second_arm,
+        with_fixed=frame.fixed[first] | frame.fixed[second])
 
 
 def unit_vectors(vectors: FloatArray) -> FloatArray:

@@ -404,8 +404,10 @@ class Trajectory:
             low, high = (int(each) for each in group["start"][row : row + 2])
             is_new = int(file.attrs["schema_version"]) >= CONTACT_LAYOUT
             names = [name for name in CONTACT_FIELDS if is_new or name not in NEW_CONTACT_FIELDS]
-            columns = {name: group[name][low:high] for name in names}
+            others = [name for name in group if name not in (*CONTACT_FIELDS, "start")]
+            columns = {name: group[name][low:high] for name in (*names, *others)}
             shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else [])) for name in names}
+            shapes |= {name: (high - low, *group[name].shape[1:]) for name in others}
             insist(segment.path, "contacts", columns, shapes)
         if self._shift is not None:
             columns["point"] = columns["point"] + self._shift
