@@ -90,7 +90,7 @@ contains
 
       call read_settings_text('mixed.nml', text, no_overrides, settings, error)
       if (failed(error)) return
-      pairs = pair_parameters(settings)
+      pairs = pair_parameters(settings, settings%forces)
       print '(a, 2es24.16)', 'plasticity', pairs%plasticity%of([1_ip, 2_ip]), pairs%plasticity%of([1_ip, 1_ip])
    end subroutine mix
 
