@@ -45,8 +45,7 @@ contains
       real(dp), intent(in) :: time
       integer :: n_columns
 
-      if (.not. allocated(self%row%value)) allocate (self%row%value(0), self%row%name(0), self%row%unit(0), &
-                                                     self%row%meaning(0))
+      if (.not. allocated(self%row%value)) allocate (self%row%value(0), self%row%label(0))
       n_columns = size(self%row%value)
       call reserve(self, n_columns, self%n + 1)
       self%n = self%n + 1
@@ -112,7 +111,7 @@ contains
          if (n_rows == 0_lp) return
          call serializer%count_rows(self%field_name('value'), n_values)
          if (allocated(serializer%error)) return
-         n_columns = size(self%row%name) + 1
+         n_columns = size(self%row%label) + 1
          if (n_rows < 0_lp .or. n_rows > n_values .or. n_rows*int(n_columns, lp) /= n_values) then
             call raise(serializer%error, input_error, self%field_name('value')//' has another number of columns')
             return
@@ -148,9 +147,9 @@ contains
       integer :: j, k
 
       hash = 0_lp
-      if (.not. allocated(self%row%name)) return
-      do k = 1, size(self%row%name)
-         text = trim(self%row%name(k))//' '//trim(self%row%unit(k))
+      if (.not. allocated(self%row%label)) return
+      do k = 1, size(self%row%label)
+         text = trim(self%row%label(k)%name)//' '//trim(self%row%label(k)%unit)
          do j = 1, len(text)
             hash = mix_word(hash, int(ichar(text(j:j)), lp))
          end do

@@ -1,4 +1,4 @@
-!> Response of a monitor of the run: it stops the run, or it warns once and then only counts.
+!> Response of a guard of the run: it stops the run, or it warns once and then only counts.
 module polydem_warning
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: dp, lp
@@ -6,7 +6,7 @@ module polydem_warning
    private
    public :: warning_t
 
-   !> The warnings of one monitor
+   !> The warnings of one guard
    type :: warning_t
       !> Number of warnings, reported or not
       integer(lp) :: count = 0_lp
@@ -16,7 +16,6 @@ module polydem_warning
       real(dp) :: weight = 0.0_dp
    contains
       procedure :: respond
-      procedure :: absorb
       procedure :: take
    end type warning_t
 
@@ -44,21 +43,6 @@ contains
       self%weight = 0.0_dp
       if (present(weight)) self%weight = weight
    end subroutine respond
-
-   !> Take over the warnings of another monitor, which then has none. The first warning of all is the pending one.
-   subroutine absorb(self, other)
-      class(warning_t), intent(inout) :: self
-      !> The other monitor; afterwards without warnings
-      type(warning_t), intent(inout) :: other
-
-      if (other%count == 0_lp) return
-      if (self%count == 0_lp) then
-         call move_alloc(other%text, self%text)
-         self%weight = other%weight
-      end if
-      self%count = self%count + other%count
-      other = warning_t()
-   end subroutine absorb
 
    !> Return the pending warning and clear it. It is thus reported once.
    subroutine take(self, text)

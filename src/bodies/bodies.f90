@@ -73,7 +73,7 @@ module polydem_bodies
       !> would be at `position + image*cell%size`, (slot, x or y)
       integer(ip), allocatable :: image(:, :)
       !> In a sheared cell what `image` lacks: sum of the shifts of the borders that each body has crossed, (slot) [m]
-      real(wp), allocatable :: slid(:)
+      real(wp), allocatable :: shear_offset(:)
       !> In a periodic cell 1/size for each body and axis, 0 along axes along which it does not repeat, (2, slot) [1/m]
       real(wp), allocatable :: folds(:, :)
       !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`
@@ -89,9 +89,9 @@ module polydem_bodies
       !> Twice the least distance of an edge from the centre of mass; of several pieces the least, each about its own
       !> centroid [m]
       real(wp), allocatable :: thickness(:)
-      !> Whether the body is one of a wall that has vanished: it has no box and meets nothing, (slot); not allocated if
-      !> no wall vanishes
-      logical, allocatable :: gone(:)
+      !> Whether the body is one of a wall that was removed: it has no box and meets nothing, (slot); not allocated if
+      !> no wall is removed
+      logical, allocatable :: removed(:)
    end type bodies_t
 
 contains

@@ -26,7 +26,8 @@ contains
 
       bodies%cell = cell
       if (cell%is_periodic .and. .not. allocated(bodies%image)) allocate (bodies%image(bodies%n, 2), source=0_ip)
-      if (cell%is_sheared .and. .not. allocated(bodies%slid)) allocate (bodies%slid(bodies%n), source=0.0_wp)
+      if (cell%is_sheared .and. .not. allocated(bodies%shear_offset)) &
+         allocate (bodies%shear_offset(bodies%n), source=0.0_wp)
    end subroutine set_cell
 
    !> Change size and shear of the cell by a step.
@@ -83,7 +84,7 @@ contains
 
       place = bodies%position(:, s)
       if (allocated(bodies%image)) place = place + real(bodies%image(s, :), wp)*bodies%cell%size
-      if (allocated(bodies%slid)) place(1) = place(1) + bodies%slid(s)
+      if (allocated(bodies%shear_offset)) place(1) = place(1) + bodies%shear_offset(s)
    end function path_of
 
    !> Stretch the places of some free bodies as the cell grows in this step. Several threads may call it for different
@@ -128,7 +129,8 @@ contains
 
    !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
    pure subroutine wrap_bodies(bodies, slots)
-      !> Bodies at the end of a step; `position` and `image` change, in a sheared cell also `velocity` and `slid`
+      !> Bodies at the end of a step; `position` and `image` change, in a sheared cell also `velocity` and
+      !> `shear_offset`
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in), contiguous :: slots(:)
@@ -164,13 +166,13 @@ contains
       associate (cell => bodies%cell, times => real(crossed, wp))
          bodies%position(1, s) = bodies%position(1, s) - times*cell%former_shift
          bodies%velocity(1, s) = bodies%velocity(1, s) - times*cell%former_jump
-         if (allocated(bodies%slid)) bodies%slid(s) = bodies%slid(s) + times*cell%former_shift
+         if (allocated(bodies%shear_offset)) bodies%shear_offset(s) = bodies%shear_offset(s) + times*cell%former_shift
       end associate
    end subroutine cross_sheared_border
 
    !> Put bodies that may be anywhere into the cell. Those that span it stay where they are.
    pure subroutine put_into_cell(bodies, slots)
-      !> Bodies after `find_folds`; `position` and `image` change, in a sheared cell also `velocity` and `slid`
+      !> Bodies after `find_folds`; `position` and `image` change, in a sheared cell also `velocity` and `shear_offset`
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)

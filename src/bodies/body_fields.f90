@@ -21,7 +21,7 @@ contains
          call serializer%field('/bodies/image_x', bodies%image(:, 1), '1', 'cells crossed along x')
          call serializer%field('/bodies/image_y', bodies%image(:, 2), '1', 'cells crossed along y')
       end if
-      if (allocated(bodies%slid)) call serializer%field('/bodies/slid', bodies%slid, 'm', &
+      if (allocated(bodies%shear_offset)) call serializer%field('/bodies/shear_offset', bodies%shear_offset, 'm', &
                                                         'shifts of the crossed borders of a sheared cell')
       call serializer%field('/bodies/angle', bodies%angle, 'rad', 'angles since the start')
       call serializer%field('/bodies/velocity', bodies%velocity, 'm/s', 'velocities of the centres of mass')

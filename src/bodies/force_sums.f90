@@ -1,7 +1,7 @@
 !> Sums of the contact forces on each body, separately for elastic, normal and tangential forces.
 !>
 !> The force of a contact acts at the centroid of the overlap. Torques are added: `lever` times the normal force,
-!> because its line of action may miss the centroid, that of cohesion for the same reason, and `twist`, the contact's
+!> because its line of action may miss the centroid, that of cohesion for the same reason, and `couple`, the contact's
 !> own torque. The second body feels the opposite force and torques.
 !>
 !> Each body sums over its contacts in descending order of the partner's identifier. A loop over all contacts in
@@ -10,8 +10,8 @@
 !> therefore have the same bits for any number of threads and ranks, and need no index from bodies to contacts.
 module polydem_force_sums
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
+   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contacts, only: contacts_t, load_block
    use polydem_kinds, only: ip, wp
    use polydem_term_list, only: append_term, n_terms, reserve_terms, term_list_t
    implicit none
@@ -21,7 +21,7 @@ module polydem_force_sums
    public :: add_terms, add_deferred_terms, assemble_forces, total_forces, find_forces, set_force
    public :: energy_of_contact
 
-   !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
+   !> Kinds of forces: elastic forces with cohesion; all normal forces, with the couple; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
    !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]
    integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10
@@ -138,11 +138,11 @@ contains
             first(5, c) = -tangential*y
             first(6, c) = tangential*x
             first(7, c) = elastic*lever_first
-            first(8, c) = normal*lever_first + block%twist(c)
+            first(8, c) = normal*lever_first + block%couple(c)
             first(9, c) = tangential*(block%arm_first(c, 1)*x + block%arm_first(c, 2)*y)
             first(10, c) = 0.5_wp*contact_energy(block%elastic(c), block%area(c), block%length(c))
             second(7, c) = -elastic*lever_second
-            second(8, c) = -(normal*lever_second + block%twist(c))
+            second(8, c) = -(normal*lever_second + block%couple(c))
             second(9, c) = -tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
             second(10, c) = first(10, c)
          end do
@@ -174,8 +174,8 @@ contains
       !> Index of the contact
       integer(ip), intent(in) :: c
 
-      energy = contact_energy(contacts%elastic(c), contacts%area(c), contacts%length(c))
-      if (contacts%has_cohesion) energy = energy + contacts%cohesion(4, c)
+      energy = contact_energy(contacts%row(c)%elastic, contacts%row(c)%area, contacts%row(c)%length)
+      if (contacts%has_cohesion) energy = energy + contacts%row(c)%cohesion(4)
    end function energy_of_contact
 
    !> Elastic energy of a contact [J/m]: exact for laws whose contacts have one, else an estimate

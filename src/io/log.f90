@@ -62,7 +62,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Whether nothing is written on the screen; default: false
       logical, intent(in), optional :: quiet
-      !> Whether lines are appended to the log of an earlier attempt; default: false
+      !> Whether lines are appended to the log of a previous start; default: false
       logical, intent(in), optional :: appended
       !> Whether the screen shows nothing but the progress line; default: false
       logical, intent(in), optional :: brief

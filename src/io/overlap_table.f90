@@ -87,13 +87,13 @@ contains
          if (.not. is_deep(c)) cycle
          k = k + 1_ip
          deep(k) = c
-         associate (i => contacts%first(c), j => contacts%second(c))
+         associate (i => contacts%row(c)%first, j => contacts%row(c)%second)
             values(:, k) = real([real(bodies%id(i), wp), real(bodies%id(j), wp), &
-                                 bodies%position(:, i) + contacts%arm_first(:, c), contacts%area(c), &
-                                 contacts%depth(c), depth_share(contacts, thinner, c)], dp)
+                                 bodies%position(:, i) + contacts%row(c)%arm_first, contacts%row(c)%area, &
+                                 contacts%row(c)%depth, depth_share(contacts, thinner, c)], dp)
          end associate
       end do
-      call order_pairs(comm, bodies, contacts%first(deep), contacts%second(deep), rows)
+      call order_pairs(comm, bodies, contacts%row(deep)%first, contacts%row(deep)%second, rows)
       call rows%to_blocks(comm, values, block)
    end subroutine collect_rows
 

@@ -88,7 +88,7 @@ contains
       call provenance%set('input_text', input_text)
       call provenance%set('resolved_input', resolved_input)
       call provenance%set('started', utc_now())
-      ! Identifier of the run, checkpoint from which this attempt of the run was restarted, hash of the initial bodies
+      ! Identifier of the run, checkpoint from which the run was restarted, hash of the initial bodies
       call provenance%set('run', '')
       call provenance%set('parent', 'none')
       call provenance%set('scene', '')

@@ -35,9 +35,9 @@ contains
       if (allocated(error)) return
       call file%open(path, error)
       header = 'step,time [s]'
-      if (allocated(row%name)) then
-         do k = 1, size(row%name)
-            header = header//','//trim(row%name(k))//' ['//trim(row%unit(k))//']'
+      if (allocated(row%label)) then
+         do k = 1, size(row%label)
+            header = header//','//trim(row%label(k)%name)//' ['//trim(row%label(k)%unit)//']'
          end do
       end if
       if (.not. allocated(error)) call file%put_line(header)
@@ -65,13 +65,13 @@ contains
       has_rows = segment%has('/series/step', error)
       if (has_rows) then
          n = 1
-         if (allocated(row%name)) n = n + size(row%name)
+         if (allocated(row%label)) n = n + size(row%label)
          call segment%read('/series/step', step, error)
          if (.not. allocated(error)) allocate (value(n, size(step)))
          do k = 1, n
             if (allocated(error)) exit
             if (k == 1) call segment%read('/series/time', column, error)
-            if (k > 1) call segment%read('/series/'//trim(row%name(k - 1)), column, error)
+            if (k > 1) call segment%read('/series/'//trim(row%label(k - 1)%name), column, error)
             if (.not. allocated(error)) value(k, :) = column(:size(step))
          end do
          if (.not. allocated(error)) then

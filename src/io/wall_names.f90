@@ -5,7 +5,7 @@ module polydem_wall_names
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip
    use polydem_strings, only: split_words, to_text
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall, only: wall_t
    implicit none
    private
    public :: wall_names_text, find_wall_names, find_material_names
@@ -15,7 +15,7 @@ contains
    !> Text of the walls with their names and the identifiers of their bodies
    pure function wall_names_text(walls) result(text)
       !> The walls
-      class(wall_bodies_t), intent(in) :: walls(:)
+      type(wall_t), intent(in) :: walls(:)
       character(len=:), allocatable :: text
       integer :: first, k, last
 
@@ -45,10 +45,10 @@ contains
       !> A file of the result
       character(len=*), intent(in) :: path
       !> The walls; none if the result has no names
-      type(wall_bodies_t), allocatable, intent(out) :: walls(:)
+      type(wall_t), allocatable, intent(out) :: walls(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
-      type(wall_bodies_t) :: wall
+      type(wall_t) :: wall
       integer :: last
 
       allocate (walls(0))
@@ -90,7 +90,7 @@ contains
    !> Read the name and the identifiers of a wall.
    subroutine read_wall(text, wall)
       character(len=*), intent(in) :: text
-      type(wall_bodies_t), intent(out) :: wall
+      type(wall_t), intent(out) :: wall
       character(len=:), allocatable :: words(:)
       integer(ip) :: first, id, last
       integer :: dash, k, status

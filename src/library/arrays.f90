@@ -4,12 +4,13 @@
 !> column of /frames. Bodies are in ascending order of identifiers, which their slots have.
 module polydem_arrays
    use polydem_bodies, only: bodies_t
-   use polydem_contact_resultant, only: find_resultant
-   use polydem_contacts, only: contact_force, contacts_t
+   use polydem_contact_columns, only: contact_columns, values_of
+   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_handles, only: simulation_handle_t
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_run_output, only: update_balance
+   use polydem_strings, only: index_of
    implicit none
    private
    public :: find_array, kind_absent, kind_integers, kind_reals
@@ -92,7 +93,7 @@ contains
          case ('fixed')
             integers = merge(1_lp, 0_lp, bodies%fixed(:n))
          case ('present')
-            if (allocated(bodies%gone)) integers = merge(0_lp, 1_lp, bodies%gone(:n))
+            if (allocated(bodies%removed)) integers = merge(0_lp, 1_lp, bodies%removed(:n))
          case ('material')
             if (allocated(bodies%material)) integers = int(bodies%material(:n), lp)
          case ('vertex_start')
@@ -120,8 +121,8 @@ contains
             reals = bodies%angular_velocity(:n)
          case ('torque')
             reals = bodies%torque(:n)
-         case ('slid')
-            if (allocated(bodies%slid)) reals = bodies%slid(:n)
+         case ('shear_offset')
+            if (allocated(bodies%shear_offset)) reals = bodies%shear_offset(:n)
          case default
             call raise_unknown('bodies/'//name, error)
          end select
@@ -153,44 +154,30 @@ contains
       integer(lp), allocatable, intent(inout) :: integers(:)
       real(wp), allocatable, intent(inout) :: reals(:)
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: shift(2), couple
+      real(dp) :: values(sum(contact_columns%width))
       integer(ip) :: c
+      integer :: before, k, n
 
-      associate (n => contacts%n)
-         select case (name)
-         case ('first')
-            integers = int(bodies%id(contacts%first(:n)), lp)
-         case ('second')
-            integers = int(bodies%id(contacts%second(:n)), lp)
-         case ('area')
-            reals = contacts%area(:n)
-         case ('length')
-            reals = contacts%area(:n)/contacts%depth(:n)
-         case ('normal')
-            width = 2_lp
-            reals = reshape(-contacts%direction(:, :n), [2*n])
-         case ('force')
-            width = 2_lp
-            allocate (reals(2*n))
-            do c = 1_ip, n
-               reals(2*c - 1:2*c) = contact_force(contacts, c)
-            end do
-         case ('point')
-            width = 2_lp
-            allocate (reals(2*n))
-            do c = 1_ip, n
-               call find_resultant(bodies, contacts, c, shift, couple)
-               reals(2*c - 1:2*c) = bodies%position(:, contacts%first(c)) + (contacts%arm_first(:, c) + shift)
-            end do
-         case ('couple')
-            allocate (reals(n))
-            do c = 1_ip, n
-               call find_resultant(bodies, contacts, c, shift, reals(c))
-            end do
-         case default
+      select case (name)
+      case ('first')
+         integers = [(int(bodies%id(contacts%row(c)%first), lp), c=1_ip, contacts%n)]
+      case ('second')
+         integers = [(int(bodies%id(contacts%row(c)%second), lp), c=1_ip, contacts%n)]
+      case default
+         k = index_of(name, contact_columns%name)
+         if (k == 0) then
             call raise_unknown('contacts/'//name, error)
-         end select
-      end associate
+            return
+         end if
+         n = contact_columns(k)%width
+         before = sum(contact_columns(:k - 1)%width)
+         width = int(n, lp)
+         allocate (reals(n*contacts%n))
+         do c = 1_ip, contacts%n
+            values = values_of(bodies, contacts, c)
+            reals(n*(c - 1) + 1:n*c) = real(values(before + 1:before + n), wp)
+         end do
+      end select
    end subroutine find_of_contacts
 
    !> Copy what describes a periodic cell.

@@ -7,7 +7,6 @@ module polydem_handles
    use omp_lib, only: omp_get_max_threads, omp_set_num_threads
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_monitor, only: monitor_t
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
@@ -47,8 +46,6 @@ module polydem_handles
    type :: snapshot_t
       !> The simulation between two steps
       type(simulation_t) :: simulation
-      !> What its guards have found
-      type(monitor_t) :: monitor
    end type snapshot_t
 
    interface

@@ -108,9 +108,9 @@ contains
       if (.not. associated(e)) return
       allocate (made)
       made%threads = max(1, int(threads))
-      made%run%attempt%is_guest = .true.
-      made%run%attempt%has_files = c_associated(folder)
-      made%run%attempt%continues = mode == mode_continue
+      made%run%options%is_guest = .true.
+      made%run%options%has_files = c_associated(folder)
+      made%run%options%continues = mode == mode_continue
       call gather_overrides(n_overrides, overrides, fortran_text(folder), words)
       if (c_associated(text)) then
          call read_settings_text(fortran_text(file), fortran_text(text), words, made%settings, e%error)
@@ -179,7 +179,7 @@ contains
       if (.not. associated(e) .or. .not. c_associated(handle)) return
       call enter(handle, self, e%error)
       if (.not. associated(self)) return
-      if (self%run%attempt%has_files) call interrupt_run(self%run, 'the host', e%error)
+      if (self%run%options%has_files) call interrupt_run(self%run, 'the host', e%error)
       call end_run(self%run, e%error)
       if (allocated(e%error)) then
          if (e%error%code == stopped_early) deallocate (e%error)
@@ -214,7 +214,7 @@ contains
       do while (done < steps .and. .not. (is_last .or. is_over(self%run) .or. allocated(e%error)))
          is_last = done + 1_c_long == steps
          if (seconds > 0.0_c_double .and. .not. is_last) is_last = wall_seconds() - began >= seconds
-         self%run%attempt%tabulates = is_last
+         self%run%options%tabulates = is_last
          call take_step(self%run, e%error)
          done = done + 1_c_long
          if (allocated(e%error)) call stop_run(self, e%error)
@@ -232,7 +232,7 @@ contains
 
       self%failure = error
       ! With a folder, the end of the run makes the table for its last frame.
-      if (.not. self%run%attempt%has_files) call tabulate_contacts(self%run%simulation)
+      if (.not. self%run%options%has_files) call tabulate_contacts(self%run%simulation)
       call end_run(self%run, error)
    end subroutine stop_run
 
@@ -252,7 +252,6 @@ contains
       if (.not. associated(self)) return
       allocate (made)
       made%simulation = self%run%simulation
-      made%monitor = self%run%monitor
       snapshot = c_loc(made)
       call leave(self)
    end function polydem_new_snapshot
@@ -272,7 +271,7 @@ contains
       if (.not. associated(self)) return
       if (.not. c_associated(snapshot)) then
          call raise(e%error, input_error, 'the snapshot is deleted')
-      else if (self%run%attempt%has_files) then
+      else if (self%run%options%has_files) then
          call raise(e%error, input_error, 'a simulation with a folder cannot return to an earlier state, since its '// &
                     'files go on; make it without a folder')
       else
@@ -281,7 +280,6 @@ contains
             call raise(e%error, input_error, 'the snapshot is of a simulation with other settings')
          else
             self%run%simulation = from%simulation
-            self%run%monitor = from%monitor
             self%run%has_begun = .true.
             if (allocated(self%failure)) deallocate (self%failure)
          end if
@@ -317,8 +315,8 @@ contains
       made%settings = self%settings
       made%threads = self%threads
       if (allocated(self%failure)) made%failure = self%failure
-      made%run%attempt = self%run%attempt
-      made%run%attempt%has_files = .false.
+      made%run%options = self%run%options
+      made%run%options%has_files = .false.
       made%run%has_begun = self%run%has_begun
       allocate (made%run%comm, source=self%run%comm)
       made%run%simulation = self%run%simulation

@@ -130,9 +130,9 @@ contains
          case ('settings')
             text = self%settings%resolved
          case ('folder')
-            if (self%run%attempt%has_files) text = self%run%folder
+            if (self%run%options%has_files) text = self%run%folder
          case ('walls')
-            text = wall_names_text(s%walls%named%wall)
+            text = wall_names_text(s%walls%wall)
          case ('energy')
             call update_balance(self%run)
             text = lines_of(self%run%row)
@@ -239,8 +239,8 @@ contains
       integer(c_long), intent(in) :: given, found
       type(error_t), allocatable, intent(inout) :: error
 
-      if (given /= found) call raise(error, input_error, 'the array that was found last has '//to_text(int(found, lp))// &
-         ' values, not '//to_text(int(given, lp)))
+      if (given /= found) call raise(error, input_error, 'the array that was found last has '// &
+         to_text(int(found, lp))//' values, not '//to_text(int(given, lp)))
    end subroutine check_size
 
 end module polydem_library_values

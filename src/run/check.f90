@@ -3,7 +3,7 @@ module polydem_check
    use polydem_initial_warnings, only: warn_of_risks
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t
-   use polydem_motion_check, only: check_motion
+   use polydem_guard, only: respond_to_motion
    use polydem_host, only: resident_memory
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
@@ -12,7 +12,7 @@ module polydem_check
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
-   use polydem_start_from, only: return_to_state
+   use polydem_start_state, only: return_to_state
    use polydem_strings, only: counted, to_text
    use polydem_scene_measures, only: measure_scene, scene_measures_t
    use polydem_thread_choice, only: thread_choice_t
@@ -91,8 +91,7 @@ contains
       call new_monitor(monitor, simulation)
       call warn_of_risks(simulation, measures, log, monitor%at_start)
       ! A body that is too fast at the start moves too far in the first step.
-      call check_motion(simulation%motion%check, simulation%bodies, simulation%moving(:simulation%n_moving), &
-                        simulation%step, simulation%dt, error)
+      call respond_to_motion(simulation, error)
       call check_step(monitor, simulation, .true., log, error)
       if (.not. allocated(error)) call return_to_state(simulation, error)
       if (.not. allocated(error)) call advance(simulation, error)

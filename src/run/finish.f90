@@ -37,7 +37,7 @@ contains
       integer(lp) :: is_not_finite(1)
 
       associate (s => run%simulation, bodies => run%simulation%bodies)
-         if (code /= run_error .or. s%step <= max(run%last_frame, run%earlier%last_frame)) return
+         if (code /= run_error .or. s%step <= max(run%last_frame, run%previous%last_frame)) return
          is_not_finite = merge(0_lp, 1_lp, all(ieee_is_finite(bodies%position)) &
                                .and. all(ieee_is_finite(bodies%velocity)) .and. all(ieee_is_finite(bodies%angle)) &
                                .and. all(ieee_is_finite(bodies%angular_velocity)))
@@ -52,7 +52,7 @@ contains
    !> End a run, also after a failure: close the trajectory, write the profile and the summary of the log; collective.
    subroutine finish(run, seconds, error)
       type(run_t), intent(inout) :: run
-      !> Elapsed time of all attempts [s]
+      !> Elapsed time of the run with its previous starts [s]
       real(dp), intent(in) :: seconds
       !> On entry the reason why the run did not finish; on return that, or a failure to write the end
       type(error_t), allocatable, intent(inout) :: error
@@ -67,7 +67,7 @@ contains
       associate (s => run%simulation)
          call hash_all_bodies(run%comm, s%bodies, hash)
          call report_counters(s, counters)
-         call report_pending_warnings(run%monitor, s, run%log)
+         call report_pending_warnings(s, run%log)
          if (allocated(error)) call write_last_frame(run, error%code, write_error)
          call run%trajectory%close(write_error, run%manifest)
          if (s%settings%output%csv .and. run%comm%is_root()) call write_csv(run, write_error)
@@ -80,13 +80,14 @@ contains
          if (s%settings%output%energy_balance) call write_energy_report(s, run%log)
          if (.not. allocated(error)) call write_end_warnings(s, run%log)
          at_end = run%log%warnings - at_end
-         call write_warning_counts(run%monitor, run%log)
+         call write_warning_counts(run%monitor, s, run%log)
          if (at_end > 0_lp) call run%log%write_line('warnings: '//to_text(at_end)//' at the end')
          if (allocated(error)) call run%log%write_line('stopped: '//status)
          call write_hash(run%log, hexadecimal(hash))
          ! The profile comes last: a result with a profile has the whole log.
          if (run%comm%is_root()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
-                                                  status, warnings_in_words(run%monitor, at_end), write_error, memory)
+                                                  status, warnings_in_words(run%monitor, s, at_end), write_error, &
+                                                 memory)
          call run%manifest%close_file(run%folder//'/'//profile_name, write_error)
       end associate
       call run%log%close(write_error)

@@ -1,25 +1,23 @@
-!> The guards of a run: calls them after each step, writes their warnings, and counts these.
+!> Calls the guards of a run after each step, writes their warnings, and counts these.
 module polydem_monitor
    use polydem_errors, only: error_t
-   use polydem_guard_list, only: list_guards, listed_guard_t
+   use polydem_guard_list, only: choose_guards
    use polydem_kinds, only: ip, lp
    use polydem_log, only: log_t
    use polydem_serializer, only: serializer_t
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: guard_item_t, simulation_t
    use polydem_strings, only: counted, to_text
    use polydem_warning, only: warning_t
    implicit none
    private
    public :: monitor_t, new_monitor, check_step, needs_contacts, asks_all, report_pending_warnings, &
-      write_warning_counts, warnings_in_words, serialize_monitor, warning_counts, set_warning_counts, most_guards
+      write_warning_counts, warnings_in_words, serialize_guards, warning_counts, set_warning_counts, most_guards
 
    !> Greatest number of guards
    integer, parameter :: most_guards = 16
 
-   !> Guards and their findings
+   !> What the guards share
    type :: monitor_t
-      !> All guards
-      type(listed_guard_t), allocatable :: list(:)
       !> Number of warnings about the initial state
       integer(lp) :: at_start = 0_lp
       !> Whether the guard of a rank asks in this step for a look of all ranks, as `asks_all` says
@@ -36,31 +34,31 @@ contains
    !> Prepare the guards. Collective.
    subroutine new_monitor(monitor, simulation)
       type(monitor_t), intent(out) :: monitor
-      !> A simulation at time 0
+      !> A simulation at time 0; its guards begin anew
       type(simulation_t), intent(inout) :: simulation
+      type(guard_item_t), allocatable :: list(:)
       integer :: k
 
-      call list_guards(monitor%list)
-      do k = 1, size(monitor%list)
-         associate (guard => monitor%list(k)%guard)
+      call choose_guards(simulation%settings, list)
+      do k = 1, size(list)
+         associate (guard => list(k)%guard)
             call guard%start(simulation)
-            guard%is_on = guard%choice /= 'off'
             monitor%stops_alone = monitor%stops_alone .or. (guard%stops_alone .and. guard%choice == 'stop')
          end associate
       end do
+      call move_alloc(list, simulation%guards)
    end subroutine new_monitor
 
    !> Serialize the findings of the guards.
-   subroutine serialize_monitor(monitor, serializer)
-      !> A monitor from `new_monitor`
-      type(monitor_t), intent(inout) :: monitor
+   subroutine serialize_guards(simulation, serializer)
+      type(simulation_t), intent(inout) :: simulation
       class(serializer_t), intent(inout) :: serializer
       integer :: k
 
-      do k = 1, size(monitor%list)
-         call monitor%list(k)%guard%serialize(serializer)
+      do k = 1, size(simulation%guards)
+         call simulation%guards(k)%guard%serialize(serializer)
       end do
-   end subroutine serialize_monitor
+   end subroutine serialize_guards
 
    !> Check a step with the guards, and write new warnings. Collective; all ranks get the error.
    subroutine check_step(monitor, simulation, is_last, log, error)
@@ -72,23 +70,28 @@ contains
       type(log_t), intent(inout) :: log
       !> Allocated if the run must stop; names body, position and step
       type(error_t), allocatable, intent(inout) :: error
+      type(guard_item_t), allocatable :: list(:)
       logical :: is_check
       integer :: k
 
       is_check = is_last .or. is_checked(simulation%step)
-      if (simulation%comm%size == 1_ip) monitor%is_asked = asks_all(monitor, simulation)
-      do k = 1, size(monitor%list)
-         associate (guard => monitor%list(k)%guard)
+      if (simulation%comm%size == 1_ip) monitor%is_asked = asks_all(simulation)
+      call move_alloc(simulation%guards, list)
+      do k = 1, size(list)
+         associate (guard => list(k)%guard)
             if (.not. guard%is_on) cycle
             guard%is_check = is_check
             guard%is_asked = monitor%is_asked
             call guard%look(simulation, error)
          end associate
       end do
+      call move_alloc(list, simulation%guards)
       if (is_check .or. monitor%stops_alone) call simulation%comm%all_reduce_error(error)
-      if (is_check .or. simulation%comm%size == 1_ip) call report_pending_warnings(monitor, simulation, log)
-      do k = 1, size(monitor%list)
-         if (monitor%list(k)%guard%is_global) call write_pending(monitor%list(k)%guard%warning, log)
+      if (is_check .or. simulation%comm%size == 1_ip) call report_pending_warnings(simulation, log)
+      do k = 1, size(simulation%guards)
+         associate (guard => simulation%guards(k)%guard)
+            if (guard%is_global) call write_pending(guard%warning, log)
+         end associate
       end do
    end subroutine check_step
 
@@ -100,8 +103,8 @@ contains
    end function is_checked
 
    !> Whether the monitor needs the table of contacts of a step
-   pure logical function needs_contacts(monitor, step, is_last)
-      type(monitor_t), intent(in) :: monitor
+   pure logical function needs_contacts(simulation, step, is_last)
+      type(simulation_t), intent(in) :: simulation
       !> The step
       integer(lp), intent(in) :: step
       !> As in `check_step`
@@ -110,41 +113,39 @@ contains
 
       needs_contacts = .false.
       if (.not. (is_last .or. is_checked(step))) return
-      do k = 1, size(monitor%list)
-         associate (guard => monitor%list(k)%guard)
+      do k = 1, size(simulation%guards)
+         associate (guard => simulation%guards(k)%guard)
             needs_contacts = needs_contacts .or. (guard%needs_contacts .and. guard%is_on)
          end associate
       end do
    end function needs_contacts
 
    !> Whether a guard of this rank asks for a look of all ranks
-   logical function asks_all(monitor, simulation)
-      type(monitor_t), intent(in) :: monitor
+   logical function asks_all(simulation)
       !> The simulation at the end of a step
       type(simulation_t), intent(in) :: simulation
       integer :: k
 
       asks_all = .false.
-      do k = 1, size(monitor%list)
-         if (.not. asks_all) asks_all = monitor%list(k)%guard%asks(simulation)
+      do k = 1, size(simulation%guards)
+         if (.not. asks_all) asks_all = simulation%guards(k)%guard%asks(simulation)
       end do
    end function asks_all
 
    !> Write the pending warnings of all ranks, and all-reduce their counts; collective.
-   subroutine report_pending_warnings(monitor, simulation, log)
-      type(monitor_t), intent(inout) :: monitor
+   subroutine report_pending_warnings(simulation, log)
       type(simulation_t), intent(inout) :: simulation
       type(log_t), intent(inout) :: log
       integer(lp) :: counts(most_guards)
       integer :: k
 
       if (simulation%comm%size > 1_ip) then
-         counts = warning_counts(monitor)
+         counts = warning_counts(simulation)
          call simulation%comm%all_reduce_max(counts)
-         call set_warning_counts(monitor, counts)
+         call set_warning_counts(simulation, counts)
       end if
-      do k = 1, size(monitor%list)
-         associate (warning => monitor%list(k)%guard%warning)
+      do k = 1, size(simulation%guards)
+         associate (warning => simulation%guards(k)%guard%warning)
             if (simulation%comm%size > 1_ip) call simulation%comm%all_reduce_text(warning%text, warning%weight)
             call write_pending(warning, log)
          end associate
@@ -164,33 +165,34 @@ contains
 
    !> Number of warnings of each guard on this rank. Once per step the counts become the greatest of all ranks, so that
    !> a step counts once however many ranks warn.
-   pure function warning_counts(monitor) result(counts)
-      type(monitor_t), intent(in) :: monitor
+   pure function warning_counts(simulation) result(counts)
+      type(simulation_t), intent(in) :: simulation
       integer(lp) :: counts(most_guards)
       integer :: k
 
       counts = 0_lp
-      do k = 1, size(monitor%list)
-         counts(k) = monitor%list(k)%guard%warning%count
+      do k = 1, size(simulation%guards)
+         counts(k) = simulation%guards(k)%guard%warning%count
       end do
    end function warning_counts
 
    !> Set the counts to the greatest of all ranks.
-   pure subroutine set_warning_counts(monitor, counts)
-      type(monitor_t), intent(inout) :: monitor
+   pure subroutine set_warning_counts(simulation, counts)
+      type(simulation_t), intent(inout) :: simulation
       !> Counts in the order of `warning_counts`
       integer(lp), intent(in) :: counts(:)
       integer :: k
 
-      do k = 1, size(monitor%list)
-         monitor%list(k)%guard%warning%count = counts(k)
+      do k = 1, size(simulation%guards)
+         simulation%guards(k)%guard%warning%count = counts(k)
       end do
    end subroutine set_warning_counts
 
    !> Numbers of warnings of each kind, as in '2 about the initial state; 30 steps with a contact that was too deep';
    !> empty without one
-   function warnings_in_words(monitor, at_end) result(text)
+   function warnings_in_words(monitor, simulation, at_end) result(text)
       type(monitor_t), intent(in) :: monitor
+      type(simulation_t), intent(in) :: simulation
       !> Number of warnings at the end of the run
       integer(lp), intent(in) :: at_end
       character(len=:), allocatable :: text
@@ -198,8 +200,8 @@ contains
 
       text = ''
       if (monitor%at_start > 0_lp) text = text//'; '//to_text(monitor%at_start)//' about the initial state'
-      do k = 1, size(monitor%list)
-         associate (guard => monitor%list(k)%guard)
+      do k = 1, size(simulation%guards)
+         associate (guard => simulation%guards(k)%guard)
             if (guard%warning%count > 0_lp) text = text//'; '//counted(guard%warning%count, guard%noun)//' '// &
                guard%finding
          end associate
@@ -209,15 +211,16 @@ contains
    end function warnings_in_words
 
    !> Write what each guard has found.
-   subroutine write_warning_counts(monitor, log)
+   subroutine write_warning_counts(monitor, simulation, log)
       type(monitor_t), intent(in) :: monitor
+      type(simulation_t), intent(in) :: simulation
       type(log_t), intent(inout) :: log
       integer :: k
 
       if (monitor%at_start > 0_lp) call log%write_line( &
          'warnings: '//to_text(monitor%at_start)//' about the initial state')
-      do k = 1, size(monitor%list)
-         if (monitor%list(k)%guard%report() /= '') call log%write_line(monitor%list(k)%guard%report())
+      do k = 1, size(simulation%guards)
+         if (simulation%guards(k)%guard%report() /= '') call log%write_line(simulation%guards(k)%guard%report())
       end do
    end subroutine write_warning_counts
 

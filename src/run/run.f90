@@ -1,6 +1,6 @@
 !> The state of a run: simulation, output files, monitor, checkpoints and time limit.
 module polydem_run
-   use polydem_checkpoint_fields, only: attempts_t
+   use polydem_checkpoint_fields, only: restarts_t
    use polydem_checkpoint_schedule, only: checkpoints_t
    use polydem_communicator, only: communicator_t
    use polydem_energy_balance, only: balance_t
@@ -23,13 +23,13 @@ module polydem_run
    private
    public :: run_t, run_options_t, result_folder
 
-   !> Options of an attempt: how to use the result of earlier attempts, and the time limit
+   !> Options of a start of the program: how to use the result of previous starts, and the time limit
    type :: run_options_t
       !> Whether to restart from the last checkpoint (--continue)
       logical :: continues = .false.
       !> Whether the settings may differ from those of that checkpoint (--changed)
       logical :: may_change = .false.
-      !> Limit of the elapsed time of the attempt [s]; 0: no limit
+      !> Limit of the elapsed time since this start [s]; 0: no limit
       real(dp) :: limit = 0.0_dp
       !> Whether the screen shows nothing but the progress line
       logical :: is_brief = .false.
@@ -37,7 +37,7 @@ module polydem_run
       logical :: has_files = .true.
       !> Whether the run is a guest in a program that has the screen and the signals
       logical :: is_guest = .false.
-      !> Whether the next step keeps the table of contacts for the host
+      !> Whether the next step keeps the table of contacts for this program
       logical :: tabulates = .false.
       !> How the number of threads is determined
       type(thread_choice_t) :: threads
@@ -47,20 +47,20 @@ module polydem_run
    type :: run_t
       !> Communicator of the run
       class(communicator_t), allocatable :: comm
-      !> Options of this attempt
-      type(run_options_t) :: attempt
+      !> Options of this start
+      type(run_options_t) :: options
       !> Warning if the ranks have more threads than there are processors; else empty
       character(len=:), allocatable :: oversubscription
       !> Whether steps may be done: the run is prepared, and has not ended
       logical :: has_begun = .false.
-      !> Step at which this attempt begins
+      !> Step at which this start of the program begins
       integer(lp) :: first_step = 0_lp
-      !> Start of the attempt, from `wall_seconds` [s]
+      !> Start of the program, from `wall_seconds` [s]
       real(dp) :: began = 0.0_dp
-      !> State of the result folder after earlier attempts
-      type(restart_state_t) :: earlier
-      !> Scene hash and counts of all attempts
-      type(attempts_t) :: attempts
+      !> State of the result folder after previous starts
+      type(restart_state_t) :: previous
+      !> Scene hash and counts of all restarts
+      type(restarts_t) :: restarts
       !> Schedule of checkpoints
       type(checkpoints_t) :: checkpoints
       !> The simulation
@@ -85,7 +85,7 @@ module polydem_run
       character(len=:), allocatable :: folder
       !> Manifest of the result; only the root rank writes it
       type(manifest_t) :: manifest
-      !> Remark on how the folder was locked or where its former result is; unallocated if there is none
+      !> Note on how the folder was locked or where its former result is; unallocated if there is none
       character(len=:), allocatable :: folder_note
       !> Lock of the result folder; the root rank acquires it
       type(folder_lock_t) :: lock

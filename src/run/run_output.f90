@@ -65,12 +65,12 @@ contains
       type(run_t), intent(in) :: run
 
       associate (s => run%simulation)
-         needs_table = run%attempt%tabulates
+         needs_table = run%options%tabulates
          needs_table = needs_table .or. s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
          if (run%series_steps > 0.0_dp) needs_table = needs_table .or. &
             is_due(s%step + 1_lp, s%n_steps, run%series_steps) .or. is_line_due(run, s%step + 1_lp)
          if (s%stages%number > 0_ip) needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)
-         needs_table = needs_table .or. needs_contacts(run%monitor, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
+         needs_table = needs_table .or. needs_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
    end function needs_table
 
@@ -82,7 +82,7 @@ contains
 
       associate (s => run%simulation, number => run%simulation%stages%number)
          if (number == 0_ip) return
-         associate (stage => s%settings%stage(number), gravity => s%settings%forces%gravity)
+         associate (stage => s%settings%stage(number), gravity => s%forces%gravity)
             text = 'stage      '//stage%name//', '//to_text(number)//' of '// &
                to_text(size(s%settings%stage, kind=ip))//', from step '//to_text(s%stages%first(number))
             if (stage%until == 'duration') text = text//' for '//to_text(stage%duration)//' s'
@@ -93,7 +93,7 @@ contains
                to_text(gravity(2), 3)//' m/s2'
             if (abs(stage%friction_scale - 1.0_wp) > 0.0_wp) text = text//', friction times '// &
                to_text(stage%friction_scale, 3)
-            if (stage%drag > 0.0_wp) text = text//', drag '//to_text(s%settings%forces%drag, 3)//' 1/s'
+            if (stage%drag > 0.0_wp) text = text//', drag '//to_text(s%forces%drag, 3)//' 1/s'
          end associate
       end associate
       call run%log%write_line(text)
@@ -113,30 +113,30 @@ contains
       call name_terms(run%balance, .not. run%simulation%bodies%cell%is_periodic, run%row)
    end subroutine update_balance
 
-   !> Keep a row of the series if one is due, unless a file of an earlier attempt has it; collective.
+   !> Keep a row of the series if one is due, unless a file of a previous start has it; collective.
    subroutine record_row(run)
       type(run_t), intent(inout) :: run
 
       associate (s => run%simulation)
-         if (.not. run%series_steps > 0.0_dp .or. s%step <= run%earlier%last_frame) return
+         if (.not. run%series_steps > 0.0_dp .or. s%step <= run%previous%last_frame) return
          if (.not. is_due(s%step, s%n_steps, run%series_steps)) return
          call collect_row(s)
          call s%series%keep_row(s%step, real(time_of(s), dp))
       end associate
    end subroutine record_row
 
-   !> Write a frame, unless this or an earlier attempt wrote it; collective.
+   !> Write a frame, unless this or a previous start wrote it; collective.
    subroutine write_frame(run, error)
       type(run_t), intent(inout) :: run
       !> Allocated if it cannot be written
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%simulation%step <= max(run%last_frame, run%earlier%last_frame)) return
-      if (.not. run%attempt%has_files) return
+      if (run%simulation%step <= max(run%last_frame, run%previous%last_frame)) return
+      if (.not. run%options%has_files) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
          if (allocated(s%traffic)) then
-            call s%traffic%departures%drop_rows(run%earlier%last_frame)
+            call s%traffic%departures%drop_rows(run%previous%last_frame)
             if (output%contacts) then
                call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, &
                                                run%manifest, s%series, s%traffic%departures)

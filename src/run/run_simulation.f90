@@ -1,7 +1,7 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
-   use polydem_check_ranks, only: check_ranks
-   use polydem_checkpoint_fields, only: attempts_t
+   use polydem_begin_run, only: begin_run
+   use polydem_checkpoint_fields, only: restarts_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_end_condition, only: decide_end, is_at_limit, pass_end
@@ -9,14 +9,11 @@ module polydem_run_simulation
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
    use polydem_monitor, only: asks_all, most_guards, set_warning_counts, report_pending_warnings, warning_counts
-   use polydem_oversubscription, only: oversubscription
-   use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
    use polydem_finish, only: finish
    use polydem_run_output, only: end_step, needs_table, update_balance, write_frame, write_stage
    use polydem_settings, only: settings_t
-   use polydem_begin_run, only: build_start, open_output
-   use polydem_start_from, only: return_to_state
+   use polydem_start_state, only: return_to_state
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_decomposition, stage_output
@@ -27,19 +24,19 @@ module polydem_run_simulation
 contains
 
    !> Run a simulation, and write trajectory, profile and log to its result folder; collective.
-   subroutine run_simulation(settings, force, error, attempt, comm)
+   subroutine run_simulation(settings, force, error, options, comm)
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result (--force)
       logical, intent(in) :: force
       !> Allocated if the run fails, or if a signal or the time limit ends it early
       type(error_t), allocatable, intent(inout) :: error
-      !> Options of this attempt; absent: a new run without a time limit
-      type(run_options_t), intent(in), optional :: attempt
+      !> Options of this start; absent: a new run without a time limit
+      type(run_options_t), intent(in), optional :: options
       !> Communicator of the run, absent: a serial one. Only its root rank writes files that the ranks do not share
       class(communicator_t), intent(in), optional :: comm
       type(run_t) :: run
 
-      if (present(attempt)) run%attempt = attempt
+      if (present(options)) run%options = options
       call start_run(settings, force, run, error, comm)
       do while (.not. (is_over(run) .or. allocated(error)))
          call take_step(run, error)
@@ -47,8 +44,8 @@ contains
       call end_run(run, error)
    end subroutine run_simulation
 
-   !> Prepare a run up to its first step, and write the first frame unless an earlier attempt wrote it. Nothing is left
-   !> to do if an earlier attempt finished the run. Collective; all ranks get the same error.
+   !> Prepare a run up to its first step, and write the first frame unless a previous start wrote it. Nothing is left
+   !> to do if a previous start finished the run. Collective; all ranks get the same error.
    subroutine start_run(settings, force, run, error, comm)
       type(settings_t), intent(in) :: settings
       !> As in `run_simulation`
@@ -62,31 +59,24 @@ contains
       run%began = wall_seconds()
       call choose_communicator(run%comm, comm)
       run%folder = result_folder(settings)
-      if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
+      if (run%options%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
-      call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error) .and. run%attempt%has_files) call build_and_lock(settings, force, run, error)
-      if (.not. allocated(error) .and. .not. run%attempt%has_files) call build_start(settings, run, error)
-      if (.not. allocated(error)) then
-         run%oversubscription = oversubscription(run%comm)
-         call prepare(settings, force, run, error)
-      end if
-      if (.not. allocated(error) .and. run%attempt%has_files) call open_output(run, error)
+      call begin_run(settings, force, run, error)
       if (allocated(error)) return
       run%has_begun = .true.
       call begin_steps(run, error)
    end subroutine start_run
 
-   !> Write the stage and, unless an earlier attempt wrote it, the first frame; collective.
+   !> Write the stage and, unless a previous start wrote it, the first frame; collective.
    subroutine begin_steps(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: begins
 
-      if (run%earlier%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
+      if (run%previous%checkpoint > 0_ip) call pass_end(run%simulation, begins, error)
       call write_stage(run)
       run%first_step = run%simulation%step
-      if (run%earlier%checkpoint > 0_ip) return
+      if (run%previous%checkpoint > 0_ip) return
       call end_step(run, error)
       if (.not. allocated(error)) call return_to_state(run%simulation, error)
    end subroutine begin_steps
@@ -122,12 +112,12 @@ contains
       !> On entry the reason why the run did not finish
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%has_begun .and. run%attempt%has_files) then
-         call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
+      if (run%has_begun .and. run%options%has_files) then
+         call finish(run, run%restarts%seconds + (wall_seconds() - run%began), error)
          ! The result is complete without it. Before its first step a continued run has no pairs that it could write;
          ! the checkpoint from which it came is that of its end.
          if (run%simulation%settings%checkpoint%at_end .and. .not. allocated(error)) then
-            if (run%simulation%step > run%first_step .or. run%earlier%checkpoint == 0_ip) &
+            if (run%simulation%step > run%first_step .or. run%previous%checkpoint == 0_ip) &
                call write_checkpoint(run, error)
          end if
          call run%comm%all_reduce_error(error)
@@ -159,18 +149,18 @@ contains
       integer(lp) :: flags(3 + most_guards)
 
       is_due = .false.
-      if (run%comm%is_root() .and. run%attempt%has_files) &
+      if (run%comm%is_root() .and. run%options%has_files) &
          call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
       must_stop = allocated(run%reason)
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
       flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), &
-               merge(1_lp, 0_lp, asks_all(run%monitor, run%simulation)), warning_counts(run%monitor)]
+               merge(1_lp, 0_lp, asks_all(run%simulation)), warning_counts(run%simulation)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
       run%monitor%is_asked = flags(3) == 1_lp
-      call set_warning_counts(run%monitor, flags(4:))
+      call set_warning_counts(run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 
@@ -200,7 +190,7 @@ contains
       logical :: begins
 
       call decide_end(run%simulation)
-      if (is_at_limit(run%simulation) .and. run%attempt%has_files) then
+      if (is_at_limit(run%simulation) .and. run%options%has_files) then
          call update_balance(run)
          call write_frame(run, error)
          if (.not. allocated(error)) call write_checkpoint(run, error)
@@ -214,19 +204,19 @@ contains
    subroutine write_checkpoint(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
 
       associate (s => run%simulation)
          call s%timers%start()
          ! A checkpoint holds the number of warnings, not their text.
-         call report_pending_warnings(run%monitor, s, run%log)
+         call report_pending_warnings(s, run%log)
          ! The frames up to the checkpoint are on disk before the checkpoint is.
          call run%trajectory%close(error, run%manifest)
          if (allocated(error)) return
-         attempts = run%attempts
-         attempts%segments = int(run%trajectory%number, lp)
-         attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
-         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, run%monitor, error)
+         restarts = run%restarts
+         restarts%segments = int(run%trajectory%number, lp)
+         restarts%seconds = restarts%seconds + (wall_seconds() - run%began)
+         call run%checkpoints%write(run%folder, run%provenance, run%comm, s, restarts, error)
          call s%timers%add_to_total(stage_output)
       end associate
    end subroutine write_checkpoint

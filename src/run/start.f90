@@ -4,22 +4,46 @@ module polydem_start
    use polydem_assign_walls, only: assign_walls
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t
+   use polydem_former_step, only: find_former_step
+   use polydem_global_hash, only: hash_scene
+   use polydem_hash, only: hexadecimal
    use polydem_kinds, only: ip, wp
    use polydem_law_factory, only: check_law
    use polydem_process_limits, only: check_threads
+   use polydem_run, only: run_t
    use polydem_scene, only: build_scene
+   use polydem_scene_measures, only: measure_scene
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_start_from, only: read_start, recall_history
+   use polydem_start_bodies, only: read_start_bodies
    use polydem_start_forces, only: start_forces
    use polydem_start_simulation, only: place_bodies
+   use polydem_start_state, only: recall_history
    use polydem_thread_choice, only: choose_threads, thread_choice_t
-   use polydem_wall_bodies, only: wall_bodies_t
    implicit none
    private
-   public :: new_simulation
+   public :: build_start, new_simulation
 
 contains
+
+   !> Build the simulation at time 0, measure it and hash its scene, unless an earlier call did. Collective; all ranks
+   !> get the same error.
+   subroutine build_start(settings, run, error)
+      type(settings_t), intent(in) :: settings
+      !> The run; `simulation`, `measures` and the scene hashes are set
+      type(run_t), intent(inout) :: run
+      !> Allocated for bad input
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: former_step
+
+      if (allocated(run%scene_hash)) return
+      call find_former_step(run, former_step)
+      call new_simulation(settings, run%simulation, error, run%comm, run%options%threads, former_step)
+      if (allocated(error)) return
+      call measure_scene(run%simulation, run%measures)
+      call hash_scene(run%comm, run%simulation%bodies, run%restarts%scene)
+      run%scene_hash = hexadecimal(run%restarts%scene)
+   end subroutine build_start
 
    !> Build the scene and the simulation that the settings define. Collective; all ranks get the same error.
    subroutine new_simulation(settings, self, error, comm, threads, former_step)
@@ -32,18 +56,17 @@ contains
       class(communicator_t), intent(in), optional :: comm
       !> How the number of threads is determined; default: it is set already
       type(thread_choice_t), intent(inout), optional :: threads
-      !> Time step of an earlier attempt, which the simulation keeps unless the settings have one [s]; 0: there is none
+      !> Time step of a previous start, which the simulation keeps unless the settings have one [s]; 0: there is none
       real(wp), intent(in), optional :: former_step
       class(communicator_t), allocatable :: ranks
-      type(wall_bodies_t), allocatable :: of_result(:)
 
       call choose_communicator(ranks, comm)
       if (present(former_step)) self%dt = former_step
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       if (settings%scene%name == 'result') then
-         call read_start(settings, ranks, self%bodies, of_result, error)
-         if (.not. allocated(error)) call assign_walls(settings, self%bodies, of_result, self%walls, error)
+         call read_start_bodies(settings, ranks, self%bodies, self%walls%wall, error)
+         if (.not. allocated(error)) call assign_walls(settings, self%bodies, self%walls, error)
       else
          call build_scene(settings, self%bodies, self%walls, error, ranks%rank, ranks%size)
       end if
@@ -51,7 +74,7 @@ contains
       if (present(threads) .and. .not. allocated(error)) &
          call set_threads(threads, ranks, size(self%bodies%free, kind=ip), error)
       if (.not. allocated(error)) call place_bodies(settings, ranks, self, error)
-      if (settings%scene%name == 'result' .and. .not. allocated(error)) call recall_history(self, error)
+      if (.not. allocated(error)) call recall_history(self, error)
       if (.not. allocated(error)) call start_forces(self, error)
    end subroutine new_simulation
 

@@ -1,49 +1,162 @@
-!> The walls of a scene: which fixed bodies motions and loads drive, and the walls by name.
+!> The walls of a scene, from its settings: their motions and loads, and walls without a name, of other fixed bodies
+!> that motions drive.
 module polydem_assign_walls
    use polydem_bodies, only: bodies_t
+   use polydem_check_loads, only: act_together, one_of_them
+   use polydem_driven, only: along_angle, new_window
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_motion, only: motion_item_t
+   use polydem_motion, only: motion_item_t, motion_limits_t
    use polydem_motion_factory, only: new_motion
-   use polydem_name_walls, only: assign_loads, ids_of_wall, name_walls
-   use polydem_named_walls, only: named_walls_t
+   use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of
-   use polydem_strings, only: text_t, to_text
-   use polydem_wall, only: new_wall, wall_t
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_strings, only: index_of, text_t, to_text
+   use polydem_wall, only: gap, number_of, wall_t
+   use polydem_wall_load, only: wall_load_t
    use polydem_walls, only: walls_t
    implicit none
    private
    public :: assign_walls
 
+   !> Directions of a load, by their numbers
+   character(len=*), parameter :: directions(3) = [character(len=5) :: 'x', 'y', 'angle']
+
 contains
 
    !> Make the walls of a scene from its settings.
-   subroutine assign_walls(settings, bodies, named, walls, error)
+   subroutine assign_walls(settings, bodies, walls, error)
       !> Settings: groups &wall, &motion and &load
       type(settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
-      !> Walls with names and their bodies, which motions and loads refer to
-      type(wall_bodies_t), intent(in) :: named(:)
-      !> The walls; their record is not started
+      !> Those with names, and the identifiers of their bodies; afterwards all walls, without a record
       type(walls_t), intent(inout) :: walls
       !> Allocated if a motion or a load names bodies that cannot move
       type(error_t), allocatable, intent(inout) :: error
+      ! Slots of the fixed bodies
+      integer(ip), allocatable :: slots(:)
+      ! Whether a motion, or a load behind the motions, moves a body, (motion or load, fixed body)
+      logical, allocatable :: moves(:, :)
+      integer(ip) :: k, s
 
-      call assign_motions(settings, bodies, named, walls%driven, error)
+      walls%n_named = size(walls%wall, kind=ip)
+      do k = 1_ip, walls%n_named
+         call walls%wall(k)%start(bodies)
+         call set_end(settings, walls%wall(k))
+      end do
+      slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
+      call find_motions(settings, bodies, slots, walls, moves, error)
+      if (.not. allocated(error)) call check_directions(settings, walls%motions, moves, error)
       if (allocated(error)) return
-      call name_walls(settings, bodies, named, walls%driven, walls%named)
-      call assign_loads(settings, named, walls%loads)
-      call check_sample(settings, bodies, walls%named, error)
+      do k = 1_ip, walls%n_named
+         call set_pivot(settings, slots, moves, walls, walls%wall(k))
+      end do
+      call assign_drivers(bodies, slots, moves, walls)
+      call walls%find_slots(bodies)
+      call assign_loads(settings, walls%wall, walls%loads)
+      call check_sample(settings, bodies, walls%wall, error)
    end subroutine assign_walls
 
+   !> Set the time at which a wall is removed.
+   pure subroutine set_end(settings, wall)
+      type(settings_t), intent(in) :: settings
+      type(wall_t), intent(inout) :: wall
+      integer :: k
+
+      do k = 1, size(settings%wall)
+         if (settings%wall(k)%name == wall%name .and. settings%wall(k)%vanish_at > 0.0_wp) &
+            wall%vanish_at = settings%wall(k)%vanish_at
+      end do
+   end subroutine set_end
+
+   !> State the torque on a wall about the pivot of the first motion of its first body that has one, or of its first
+   !> load by angle, else about the origin.
+   pure subroutine set_pivot(settings, slots, moves, walls, wall)
+      type(settings_t), intent(in) :: settings
+      !> Slots of the fixed bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Whether a motion, or a load behind the motions, moves each of them
+      logical, intent(in) :: moves(:, :)
+      type(walls_t), intent(in) :: walls
+      type(wall_t), intent(inout) :: wall
+      integer :: k, s
+
+      if (size(wall%slots) == 0) return
+      do k = size(settings%load), 1, -1
+         if (settings%load(k)%wall == wall%name .and. settings%load(k)%direction == 'angle') &
+            wall%pivot = settings%load(k)%pivot
+      end do
+      s = findloc(slots, wall%slots(1), dim=1)
+      if (s == 0) return
+      do k = size(walls%motions), 1, -1
+         if (moves(k, s) .and. walls%motions(k)%motion%has_pivot) wall%pivot = walls%motions(k)%motion%pivot
+      end do
+   end subroutine set_pivot
+
+   !> Give each wall with a name its motions and loads, and make walls of the other bodies with the same ones. Bodies of
+   !> a wall of which a motion moves only some are among the others.
+   subroutine assign_drivers(bodies, slots, moves, walls)
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the fixed bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Whether a motion, or a load behind the motions, moves each of them
+      logical, intent(in) :: moves(:, :)
+      type(walls_t), intent(inout) :: walls
+      logical :: is_open(size(slots)), is_same(size(slots))
+      ! Place in `slots` of each slot, 0 for free bodies; those of the bodies of a wall
+      integer(ip) :: place(bodies%n)
+      integer(ip), allocatable :: own(:)
+      integer(ip) :: j, k, s
+
+      is_open = any(moves, 1)
+      place = 0_ip
+      place(slots) = [(s, s=1_ip, size(slots, kind=ip))]
+      do k = 1_ip, walls%n_named
+         own = place(walls%wall(k)%slots)
+         own = pack(own, own > 0_ip)
+         if (size(own) == 0 .or. .not. all(is_open(own))) cycle
+         if (.not. all([(all(moves(:, own(j)) .eqv. moves(:, own(1))), j=1_ip, size(own, kind=ip))])) cycle
+         walls%wall(k)%motions = motions_of(own(1))
+         walls%wall(k)%loads = loads_of(own(1))
+         is_open(own) = .false.
+      end do
+      do while (any(is_open))
+         s = findloc(is_open, .true., dim=1, kind=ip)
+         is_same = is_open .and. all(moves .eqv. spread(moves(:, s), 2, size(slots)), 1)
+         call walls%append(bodies, bodies%id(pack(slots, is_same)), motions_of(s), loads_of(s))
+         is_open = is_open .and. .not. is_same
+      end do
+
+   contains
+
+      !> Numbers of the motions of a fixed body
+      pure function motions_of(body) result(numbers)
+         !> Its place in `slots`
+         integer(ip), intent(in) :: body
+         integer, allocatable :: numbers(:)
+         integer :: m
+
+         numbers = pack([(m, m=1, size(walls%motions))], moves(:size(walls%motions), body))
+      end function motions_of
+
+      !> Numbers of its loads
+      pure function loads_of(body) result(numbers)
+         !> Its place in `slots`
+         integer(ip), intent(in) :: body
+         integer, allocatable :: numbers(:)
+         integer :: m
+
+         numbers = pack([(m, m=1, size(moves, 1) - size(walls%motions))], moves(size(walls%motions) + 1:, body))
+      end function loads_of
+
+   end subroutine assign_drivers
+
    !> Check that the walls that bound the sample along an axis are apart along it.
-   subroutine check_sample(settings, bodies, named, error)
+   subroutine check_sample(settings, bodies, walls, error)
       type(settings_t), intent(in) :: settings
       type(bodies_t), intent(in) :: bodies
-      type(named_walls_t), intent(in) :: named
+      type(wall_t), intent(in) :: walls(:)
       type(error_t), allocatable, intent(inout) :: error
 
       if (settings%sample%area /= 'walls') return
@@ -58,15 +171,11 @@ contains
          !> The entry, and what its walls are
          character(len=*), intent(in) :: key, meaning
          integer, intent(in) :: axis
-         integer(ip) :: k, pair(2)
+         integer(ip) :: pair(2)
 
          if (size(names) /= 2) return
-         pair = 0_ip
-         do k = 1_ip, size(named%wall, kind=ip)
-            if (named%wall(k)%name == names(1)%text) pair(1) = k
-            if (named%wall(k)%name == names(2)%text) pair(2) = k
-         end do
-         if (named%gap(pair, axis, bodies) > 0.0_wp) return
+         pair = [number_of(names(1)%text, walls), number_of(names(2)%text, walls)]
+         if (gap(walls(pair(1)), walls(pair(2)), axis, bodies) > 0.0_wp) return
          call raise(error, input_error, place_of(settings, 'sample', key)//': '''//key//''' in &sample: the walls '// &
                     names(1)%text//' and '//names(2)%text//' are not apart along '//'xy'(axis:axis)// &
                     ', so there is no sample between them; '''//key//''' names '//meaning)
@@ -74,86 +183,120 @@ contains
 
    end subroutine check_sample
 
-   !> Find the bodies of each prescribed motion and load, and make walls of those with the same ones.
-   subroutine assign_motions(settings, bodies, named, walls, error)
+   !> Make the motions, and find the bodies that motions and loads move.
+   subroutine find_motions(settings, bodies, slots, walls, moves, error)
       type(settings_t), intent(in) :: settings
       type(bodies_t), intent(in) :: bodies
-      !> Walls with names, which motions may refer to
-      type(wall_bodies_t), intent(in) :: named(:)
-      !> The moving walls
-      type(wall_t), allocatable, intent(out) :: walls(:)
+      !> Slots of the fixed bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Walls with names; the motions are set
+      type(walls_t), intent(inout) :: walls
+      !> Whether a motion, or a load behind the motions, moves each fixed body
+      logical, allocatable, intent(out) :: moves(:, :)
       !> Allocated if a motion or a load names bodies that cannot move
       type(error_t), allocatable, intent(inout) :: error
-      ! Slots of the fixed bodies; the wall of each one, 0 if it is at rest; the first body of each wall
-      integer(ip), allocatable :: slots(:), wall_of(:), first(:)
-      ! Whether a motion, or a load behind the motions, moves a body, (motion or load, fixed body)
-      logical, allocatable :: moves(:, :)
-      type(motion_item_t), allocatable :: motions(:)
-      integer(ip), allocatable :: indices(:)
-      integer(ip) :: k, n, n_motions, s, w
+      integer :: k, n
 
-      slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
-      n_motions = size(settings%motion, kind=ip)
-      allocate (moves(n_motions + size(settings%load), size(slots)), motions(n_motions))
-      do k = 1_ip, size(motions, kind=ip)
+      n = size(settings%motion)
+      allocate (walls%motions(n), moves(n + size(settings%load), size(slots)))
+      do k = 1, n
          associate (motion => settings%motion(k))
-            call find_moved(ids_of(motion, named), bodies, slots, moves(k, :), error)
+            call find_moved(ids_of(motion, walls%wall), bodies, slots, moves(k, :), error)
             if (allocated(error)) then
                error%message = origin_of(settings, motion)//error%message
                return
             end if
+            call new_motion(settings, k, walls%motions(k)%motion, error)
+            if (allocated(error)) return
          end associate
-         call new_motion(settings, settings%motion(k), motions(k)%motion, error)
+      end do
+      do k = 1, size(settings%load)
+         call find_loaded(settings, settings%load(k)%wall, walls%wall, bodies, slots, moves(n + k, :), error)
          if (allocated(error)) return
       end do
-      do k = 1_ip, size(settings%load, kind=ip)
-         call find_loaded(settings, settings%load(k)%wall, named, bodies, slots, moves(n_motions + k, :), error)
-         if (allocated(error)) return
-      end do
-      allocate (wall_of(size(slots)), first(size(slots)))
-      wall_of = 0_ip
-      n = 0_ip
-      do s = 1_ip, size(slots, kind=ip)
-         if (.not. any(moves(:, s))) cycle
-         do w = 1_ip, n
-            if (all(moves(:, first(w)) .eqv. moves(:, s))) exit
+   end subroutine find_motions
+
+   !> Check that no motion moves a wall along the direction of a load at the same time.
+   subroutine check_directions(settings, motions, moves, error)
+      type(settings_t), intent(in) :: settings
+      type(motion_item_t), intent(in) :: motions(:)
+      !> Whether a motion, or a load behind the motions, moves each fixed body
+      logical, intent(in) :: moves(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      type(motion_limits_t) :: limits
+      integer :: k, l
+
+      do l = 1, size(settings%load)
+         do k = 1, size(motions)
+            associate (load => settings%load(l), motion => settings%motion(k))
+               limits = motions(k)%motion%limits()
+               if (.not. limits%moves(index_of(load%direction, directions))) cycle
+               if (.not. any(moves(k, :) .and. moves(size(motions) + l, :))) cycle
+               if (.not. act_together([load%start, load%end], load%stage, [motion%start, motion%end], motion%stage)) &
+                  cycle
+               call raise(error, input_error, place_of(settings, 'load.'//load%name, 'direction')// &
+                          ': ''direction'' in &load '//load%name//' is one in which the motion '//motion%name// &
+                          ' moves the same wall'//one_of_them)
+               return
+            end associate
          end do
-         wall_of(s) = w
-         if (w <= n) cycle
-         n = w
-         first(n) = s
       end do
-      allocate (walls(n))
-      do w = 1_ip, n
-         indices = pack([(k, k=1_ip, n_motions)], moves(:n_motions, first(w)))
-         call new_wall(walls(w), motions(indices), bodies, pack(slots, wall_of == w))
-         walls(w)%is_loaded = any(moves(n_motions + 1:, first(w)))
+   end subroutine check_directions
+
+   !> Set the parameters of the loads.
+   pure subroutine assign_loads(settings, walls, loads)
+      type(settings_t), intent(in) :: settings
+      type(wall_t), intent(in) :: walls(:)
+      !> The loads; not allocated if there are none
+      type(wall_load_t), allocatable, intent(inout) :: loads(:)
+      integer :: j, k
+
+      if (size(settings%load) == 0) return
+      allocate (loads(size(settings%load)))
+      do k = 1, size(loads)
+         associate (given => settings%load(k), load => loads(k))
+            load%name = given%name
+            load%wall = number_of(given%wall, walls)
+            load%direction = index_of(given%direction, directions)
+            load%force = given%force
+            if (load%direction == along_angle) load%force = given%torque
+            load%stress = given%stress
+            load%width = given%width
+            do j = 1, min(2, size(given%between))
+               load%between(j) = number_of(given%between(j)%text, walls)
+            end do
+            load%pivot = given%pivot
+            load%mass = given%mass
+            load%has_weight = given%weight
+            load%damping_ratio = given%damping_ratio
+            load%window_t = new_window(given%start, given%end, given%ramp, number_of_stage(settings, given%stage))
+         end associate
       end do
-   end subroutine assign_motions
+   end subroutine assign_loads
 
    !> Find the bodies of a load-controlled wall.
-   subroutine find_loaded(settings, name, named, bodies, slots, is_moved, error)
+   subroutine find_loaded(settings, name, walls, bodies, slots, is_moved, error)
       type(settings_t), intent(in) :: settings
       character(len=*), intent(in) :: name
-      type(wall_bodies_t), intent(in) :: named(:)
+      type(wall_t), intent(in) :: walls(:)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: slots(:)
       logical, intent(out) :: is_moved(:)
       type(error_t), allocatable, intent(inout) :: error
 
-      call find_moved(ids_of_wall(name, named), bodies, slots, is_moved, error)
+      call find_moved(walls(number_of(name, walls))%id, bodies, slots, is_moved, error)
       if (allocated(error)) error%message = place_of(settings, 'wall.'//name, 'bodies')//": 'bodies' in &wall "// &
          name//': '//error%message
    end subroutine find_loaded
 
    !> Identifiers of the bodies that a motion moves; none if it moves all fixed bodies
-   pure function ids_of(motion, named) result(ids)
+   pure function ids_of(motion, walls) result(ids)
       type(motion_settings_t), intent(in) :: motion
-      type(wall_bodies_t), intent(in) :: named(:)
+      type(wall_t), intent(in) :: walls(:)
       integer(ip), allocatable :: ids(:)
 
       ids = motion%bodies
-      if (motion%wall /= '') ids = ids_of_wall(motion%wall, named)
+      if (motion%wall /= '') ids = walls(number_of(motion%wall, walls))%id
    end function ids_of
 
    !> Beginning of a message about the bodies of a motion: they are entries of a wall, or of &motion

@@ -17,7 +17,7 @@ module polydem_scene
    use polydem_settings, only: settings_t
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_strings, only: to_text
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall, only: wall_t
    use polydem_wall_outlines, only: is_anticlockwise
    use polydem_walls, only: walls_t
    implicit none
@@ -47,15 +47,14 @@ contains
       integer(ip), intent(in), optional :: rank, n_ranks
       type(body_list_t) :: list
       type(parts_t) :: parts
-      type(wall_bodies_t), allocatable :: walls_of_parts(:)
 
       if (present(rank)) list%rank = rank
       if (present(n_ranks)) list%n_ranks = n_ranks
       list%has_materials = size(settings%material) > 0
-      allocate (walls_of_parts(0))
+      allocate (walls%wall(0))
       if (settings%scene%bodies_file /= '') call list_file(settings, list, error)
       if (.not. allocated(error)) call find_parts(settings, parts, error)
-      if (.not. allocated(error)) call list_parts_beside_file(settings, parts, list, walls_of_parts, error)
+      if (.not. allocated(error)) call list_parts_beside_file(settings, parts, list, walls%wall, error)
       if (.not. allocated(error)) then
          call new_bodies(list, bodies, error)
          if (allocated(error)) error%message = origin_of_bodies(settings)//error%message
@@ -64,7 +63,7 @@ contains
          if (allocated(error) .and. parts%recipe == '') error%message = error%message// &
             overrides_of(settings, 'grains')//overrides_of(settings, 'wall')
       end if
-      if (.not. allocated(error)) call assign_walls(settings, bodies, walls_of_parts, walls, error)
+      if (.not. allocated(error)) call assign_walls(settings, bodies, walls, error)
    end subroutine build_scene
 
    !> Beginning of a message about one of all bodies
@@ -86,7 +85,7 @@ contains
       type(parts_t), intent(in) :: parts
       type(body_list_t), intent(inout) :: list
       !> Walls of the parts with their bodies
-      type(wall_bodies_t), allocatable, intent(out) :: walls(:)
+      type(wall_t), allocatable, intent(out) :: walls(:)
       type(error_t), allocatable, intent(inout) :: error
       type(body_list_t) :: whole
       type(polygon_list_t) :: given, others

@@ -11,9 +11,9 @@ module polydem_begin_stage
    use polydem_run_stages, only: run_stages_t
    use polydem_settings, only: forces_settings_t, settings_t, stage_settings_t
    use polydem_simulation, only: acts_on_all, simulation_t
-   use polydem_sort, only: place_in
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
+   use polydem_wall, only: number_of
    implicit none
    private
    public :: prepare_stages, begin_stage, continue_stages, check_reference, find_last_steps, wall_vector
@@ -24,30 +24,31 @@ module polydem_begin_stage
 contains
 
    !> Take the parameters of the first stage, before the simulation starts.
-   subroutine prepare_stages(settings, stages)
-      !> Settings; gravity and drag of &forces become those of the first stage
-      type(settings_t), intent(inout) :: settings
+   subroutine prepare_stages(settings, stages, forces)
+      type(settings_t), intent(in) :: settings
       type(run_stages_t), intent(inout) :: stages
-
-      if (size(settings%stage) == 0) return
-      stages%gravity = settings%forces%gravity
-      stages%drag = settings%forces%drag
-      stages%number = 1_ip
-      stages%first = [0_lp]
-      call set_parameters(settings%stage(1), stages, settings%forces)
-   end subroutine prepare_stages
-
-   !> Take the parameters of a stage.
-   subroutine set_parameters(stage, stages, forces)
-      type(stage_settings_t), intent(in) :: stage
-      type(run_stages_t), intent(inout) :: stages
-      !> Gravity and drag of the present stage
+      !> Parameters of the forces, as in the settings; gravity and drag become those of the first stage
       type(forces_settings_t), intent(inout) :: forces
 
-      forces%gravity = stages%gravity
-      if (size(stage%gravity) == 2) forces%gravity = stage%gravity
-      forces%drag = stages%drag + stage%drag
-      stages%friction_scale = stage%friction_scale
+      if (size(settings%stage) == 0) return
+      stages%number = 1_ip
+      stages%first = [0_lp]
+      call set_parameters(settings, stages, forces)
+   end subroutine prepare_stages
+
+   !> Take the parameters of the present stage.
+   subroutine set_parameters(settings, stages, forces)
+      type(settings_t), intent(in) :: settings
+      type(run_stages_t), intent(inout) :: stages
+      !> Parameters of the forces; gravity and drag are set
+      type(forces_settings_t), intent(inout) :: forces
+
+      associate (stage => settings%stage(stages%number))
+         forces%gravity = settings%forces%gravity
+         if (size(stage%gravity) == 2) forces%gravity = stage%gravity
+         forces%drag = settings%forces%drag + stage%drag
+         stages%friction_scale = stage%friction_scale
+      end associate
    end subroutine set_parameters
 
    !> Begin the next stage at the end of a step. Collective.
@@ -56,17 +57,17 @@ contains
       type(simulation_t), intent(inout) :: self
       real(wp) :: former(2)
 
-      former = self%settings%forces%gravity
+      former = self%forces%gravity
       associate (stages => self%stages)
          stages%number = stages%number + 1_ip
          stages%first = [stages%first, self%step]
          stages%is_decided = .false.
          stages%held_since = -1_lp
          stages%value = -1.0_wp
-         call set_parameters(self%settings%stage(stages%number), stages, self%settings%forces)
+         call set_parameters(self%settings, stages, self%forces)
          if (self%settings%stage(stages%number)%until == 'strain') stages%reference = wall_vector(self)
       end associate
-      associate (gravity => self%settings%forces%gravity)
+      associate (gravity => self%forces%gravity)
          if (self%settings%output%energy_balance .and. any(abs(gravity - former) > 0.0_wp)) call change_gravity( &
             self%energy_balance, self%comm, self%dt, former, gravity, self%bodies)
       end associate
@@ -77,16 +78,14 @@ contains
    !> Let force law, other forces, free flight, motions and loads use the parameters of the present stage.
    subroutine use_parameters(self)
       type(simulation_t), intent(inout) :: self
-      integer :: j, k
+      integer :: k
 
       call self%law%scale_friction(self%stages%friction_scale)
-      call self%body_forces%configure(self%settings%forces)
-      call self%motion%flight%start(self%settings%forces%gravity, acts_on_all(self), self%motion%integrator, &
+      call self%body_forces%configure(self%forces)
+      call self%motion%flight%start(self%forces%gravity, acts_on_all(self), self%motion%integrator, &
                                     self%bodies%n)
-      do j = 1, size(self%walls%driven)
-         do k = 1, size(self%walls%driven(j)%motions)
-            call set_window(self%stages, self%dt, self%walls%driven(j)%motions(k)%motion)
-         end do
+      do k = 1, size(self%walls%motions)
+         call set_window(self%stages, self%dt, self%walls%motions(k)%motion)
       end do
       if (allocated(self%bodies%cell%load)) call set_window(self%stages, self%dt, self%bodies%cell%load%axis)
       if (.not. allocated(self%walls%loads)) return
@@ -149,7 +148,7 @@ contains
                     'namelist has only '//to_text(size(self%settings%stage, kind=ip))//' groups &stage')
          return
       end if
-      call set_parameters(self%settings%stage(self%stages%number), self%stages, self%settings%forces)
+      call set_parameters(self%settings, self%stages, self%forces)
       call use_parameters(self)
       call find_last_steps(self%settings%stage, self%dt, self%stages, self%n_steps)
       associate (stage => self%settings%stage(self%stages%number))
@@ -175,14 +174,14 @@ contains
       associate (stage => self%settings%stage(self%stages%number), reference => self%stages%reference)
          if (stage%until /= 'strain') return
          place = place_of(self%settings, 'stage.'//stage%name, 'wall')//': stage '//stage%name
-         do k = 1, size(self%walls%named%wall)
-            associate (wall => self%walls%named%wall(k))
+         do k = 1, size(self%walls%wall)
+            associate (wall => self%walls%wall(k))
                if (wall%name /= stage%wall .and. wall%name /= stage%opposite) cycle
-               if (wall%is_gone) call raise(error, input_error, place//' measures its strain from the wall '// &
+               if (wall%is_removed) call raise(error, input_error, place//' measures its strain from the wall '// &
                                             wall%name//', which has vanished')
                radius = 0.0_wp
-               do j = 1, size(wall%id)
-                  radius = max(radius, self%bodies%radius(place_in(self%bodies%id, wall%id(j))))
+               do j = 1, size(wall%slots)
+                  radius = max(radius, self%bodies%radius(wall%slots(j)))
                end do
                if (all(abs(reference) <= coincident*radius)) call raise(error, input_error, place//': the centres '// &
                   'of the walls '//stage%wall//' and '//stage%opposite//' coincide, so their distance is no length '// &
@@ -208,17 +207,14 @@ contains
       pure function centre_of(name) result(centre)
          character(len=*), intent(in) :: name
          real(wp) :: centre(2)
-         integer :: j, k
+         integer :: j
 
          centre = 0.0_wp
-         do k = 1, size(self%walls%named%wall)
-            if (self%walls%named%wall(k)%name /= name) cycle
-            associate (id => self%walls%named%wall(k)%id)
-               do j = 1, size(id)
-                  centre = centre + path_of(self%bodies, place_in(self%bodies%id, id(j)))/real(size(id), wp)
-               end do
-            end associate
-         end do
+         associate (slots => self%walls%wall(number_of(name, self%walls%wall))%slots)
+            do j = 1, size(slots)
+               centre = centre + path_of(self%bodies, slots(j))/real(size(slots), wp)
+            end do
+         end associate
       end function centre_of
 
    end function wall_vector

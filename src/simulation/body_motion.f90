@@ -5,7 +5,6 @@ module polydem_body_motion
    use polydem_free_flight, only: free_flight_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, wp
-   use polydem_motion_check, only: motion_check_t
    implicit none
    private
    public :: body_motion_t
@@ -16,8 +15,8 @@ module polydem_body_motion
       class(integrator_t), allocatable :: integrator
       !> What a step leaves out for bodies in free flight
       type(free_flight_t) :: flight
-      !> Check of poses and displacements
-      type(motion_check_t) :: check
+      !> Greatest displacement of a point in a step, beyond which guards respond; set by them [m]
+      real(wp) :: limit = huge(1.0_wp)
    contains
       procedure :: predict
    end type body_motion_t
@@ -33,7 +32,7 @@ contains
       integer(ip), intent(in), contiguous :: slots(:)
       type(bodies_t), intent(inout) :: bodies
 
-      call self%flight%predict(self%integrator, self%check, dt, slots, bodies)
+      call self%flight%predict(self%integrator, self%limit, dt, slots, bodies)
    end subroutine predict
 
 end module polydem_body_motion

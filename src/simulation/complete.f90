@@ -8,8 +8,9 @@ module polydem_complete
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step, energy_balance_t
    use polydem_errors, only: error_t
    use polydem_force_sums, only: find_forces, force_sums_t, set_force
-   use polydem_motion_check, only: check_motion, move_within_limit
+   use polydem_guard, only: respond_to_motion
    use polydem_kinds, only: ip, wp
+   use polydem_motion_tests, only: move_within_limit
    use polydem_simulation, only: simulation_t
    use polydem_thread_changes, only: part
    use polydem_loop_results, only: loop_results_t
@@ -19,8 +20,8 @@ module polydem_complete
 
 contains
 
-   !> Complete the step from the sums of the contact forces: total forces, final velocities, energy balance, and the
-   !> guard of the motion, in one pass over the bodies. Of the total forces, only those on fixed bodies are kept.
+   !> Complete the step from the sums of the contact forces: total forces, final velocities, energy balance, and a
+   !> test of the motion, in one pass over the bodies. Of the total forces, only those on fixed bodies are kept.
    subroutine complete_step(self, error)
       !> The simulation with the sums of the contact forces
       type(simulation_t), intent(inout) :: self
@@ -37,7 +38,7 @@ contains
       !$omp    private(p, low, high) reduction(.and.:good)
       do p = 1, n_parts
          call part(n, n_parts, p, low, high)
-         call complete_part(self%dt, self%settings%forces%gravity, low, high, self%motion, self%loop, self%bodies, &
+         call complete_part(self%dt, self%forces%gravity, low, high, self%motion, self%loop, self%bodies, &
                             self%energy_balance, good)
       end do
       !$omp end parallel do
@@ -46,10 +47,9 @@ contains
       call keep_fixed(done + 1_ip, self%bodies%n, self%loop%force_sums, self%bodies)
       if (allocated(self%energy_balance%power_sum)) call count_step(self%energy_balance)
       do k = n + 1_ip, self%n_moving
-         good = good .and. move_within_limit(self%motion%check, self%bodies, self%moving(k), self%moving(k), self%dt)
+         good = good .and. move_within_limit(self%motion%limit, self%bodies, self%moving(k), self%moving(k), self%dt)
       end do
-      if (.not. good) &
-         call check_motion(self%motion%check, self%bodies, self%moving(:self%n_moving), self%step, self%dt, error)
+      if (.not. good) call respond_to_motion(self, error)
    end subroutine complete_step
 
    !> Complete the step of a part of the free bodies, block by block, and keep the forces on fixed bodies between them.
@@ -137,7 +137,7 @@ contains
       call motion%integrator%correct(dt, first, last, force, bodies)
       if (allocated(balance%power_sum)) &
          call accumulate_bodies(balance, 1.0_wp, gravity, bodies, sums, first, last)
-      good = good .and. move_within_limit(motion%check, bodies, first, last, dt)
+      good = good .and. move_within_limit(motion%limit, bodies, first, last, dt)
    end subroutine complete_run
 
 end module polydem_complete

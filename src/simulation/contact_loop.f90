@@ -8,15 +8,14 @@ module polydem_contact_loop
    use polydem_bodies, only: bodies_t
    use polydem_clock, only: wall_seconds
    use polydem_cell_load, only: add_virial
-   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_block, only: block_size, contact_block_t, is_degenerate
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_rows, only: append_rows, gather_rows, release_rows, start_rows
-   use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_fill_block, only: fill_block
    use polydem_force_sums, only: add_deferred_terms, add_terms, begin_sums, clear_sums, contact_terms_t, terms_of_block
-   use polydem_motion_check, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: find_owned_pairs
    use polydem_pair_ranges, only: balance_ranges, divide_pairs, most_ranges
@@ -42,8 +41,8 @@ contains
       logical, intent(in) :: tabulate
       !> Clock of the blocks of the first range: overlaps, then forces
       type(block_clock_t), intent(out) :: clock
-      !> Names a contact that must stop the run; on entry an error of the step, after which nothing is done
-      type(error_t), allocatable, intent(inout) :: error
+      !> On entry an error of the step, after which nothing is done
+      type(error_t), allocatable, intent(in) :: error
       integer(ip) :: ends(0:most_ranges), last(0:most_ranges)
       integer(ip) :: n, r, k
 
@@ -90,7 +89,6 @@ contains
          self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(sum(ranges%n_degenerate), lp)
       end associate
       if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%loop%incidence)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%loop%flagged, self%step, error)
    end subroutine loop_over_contacts
 
    !> Make room for the results of n ranges.
@@ -124,7 +122,7 @@ contains
       integer(ip) :: next, tested, low, high, cursor
 
       began = wall_seconds()
-      call start_results(self%contacts, r, self%loop)
+      call start_results(r, self%loop)
       next = ends(2)
       tested = next + 1_ip
       high = last(2)
@@ -160,14 +158,13 @@ contains
    end subroutine loop_over_range
 
    !> Empty the results of a range. About as many contacts are expected as this rank owned in the last step.
-   subroutine start_results(contacts, r, loop)
-      type(contacts_t), intent(in) :: contacts
+   subroutine start_results(r, loop)
       !> Index of the range
       integer(ip), intent(in) :: r
       type(loop_results_t), intent(inout) :: loop
 
-      call start_rows(contacts, merge(loop%ranges(r)%n_contacts, 0_ip, loop%has_table), loop%all_of(r))
-      call start_rows(contacts, 0_ip, loop%flagged_of(r))
+      call start_rows(merge(loop%ranges(r)%n_contacts, 0_ip, loop%has_table), loop%all_of(r))
+      call start_rows(0_ip, loop%flagged_of(r))
       loop%walls_of(r)%n = 0_ip
       loop%walls_of(r)%border%n = 0_ip
       associate (results => loop%ranges(r))
@@ -255,7 +252,7 @@ contains
       associate (flagged => loop%flagged)
          flagged%n_degenerate = 0_ip
          do c = 1_ip, flagged%n
-            if (is_degenerate(flagged, c)) flagged%n_degenerate = flagged%n_degenerate + 1_ip
+            if (is_degenerate(flagged%row(c))) flagged%n_degenerate = flagged%n_degenerate + 1_ip
          end do
          contacts%n_degenerate = flagged%n_degenerate
       end associate

@@ -8,9 +8,9 @@ module polydem_free_flight
    use polydem_body_runs, only: find_run, list_others
    use polydem_box_maker, only: turn_and_bound_block, turn_and_bound_in_cell
    use polydem_extreme_corners, only: bound_block, extreme_corners_t, forget_corners
-   use polydem_motion_check, only: find_coasting, motion_check_t
    use polydem_integrator, only: drift, integrator_t
    use polydem_kinds, only: ip, wp
+   use polydem_motion_tests, only: find_coasting
    use polydem_neighbour_search, only: neighbour_search_t
    use polydem_pair_list, only: pair_list_t
    implicit none
@@ -93,11 +93,11 @@ contains
 
    !> Predict up to `block_size` bodies; those that have coasted only drift. Several threads may call it for different
    !> bodies.
-   subroutine predict(self, integrator, check, dt, slots, bodies)
+   subroutine predict(self, integrator, limit, dt, slots, bodies)
       class(free_flight_t), intent(inout) :: self
       class(integrator_t), intent(inout) :: integrator
-      !> Guard of the displacement, which a body that coasts does not exceed
-      type(motion_check_t), intent(in) :: check
+      !> Greatest displacement of a point in a step, which a body that coasts does not exceed [m]
+      real(wp), intent(in) :: limit
       !> Time step [s]
       real(wp), intent(in) :: dt
       !> Slots of the bodies, ascending
@@ -119,7 +119,7 @@ contains
       do while (next <= n)
          call find_run(others, n, next, first, last)
          call integrator%predict(dt, first, last, bodies)
-         call find_coasting(check, bodies, first, last, dt, self%coasts)
+         call find_coasting(limit, bodies, first, last, dt, self%coasts)
       end do
    end subroutine predict
 

@@ -11,8 +11,8 @@ module polydem_predict
    use polydem_energy_balance, only: energy_balance_t
    use polydem_errors, only: error_t
    use polydem_free_flight, only: free_flight_t
-   use polydem_motion_check, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
+   use polydem_motion_tests, only: check_poses, have_valid_poses
    use polydem_neighbour_search, only: neighbour_search_t
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part

@@ -28,8 +28,6 @@ module polydem_run_stages
       real(wp) :: value = -1.0_wp
       !> Factor of the friction coefficients in this stage
       real(wp) :: friction_scale = 1.0_wp
-      !> Gravity [m/s2] and drag [1/s] of the group &forces
-      real(wp) :: gravity(2) = 0.0_wp, drag = 0.0_wp
    end type run_stages_t
 
 contains

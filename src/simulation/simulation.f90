@@ -4,7 +4,7 @@ module polydem_simulation
    use polydem_body_forces, only: body_forces_t
    use polydem_body_motion, only: body_motion_t
    use polydem_communicator, only: communicator_t
-   use polydem_contact_history, only: contact_history_t, history_kind_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: balance_t, energy_balance_t, evaluate_balance
@@ -16,14 +16,17 @@ module polydem_simulation
    use polydem_run_stages, only: run_stages_t
    use polydem_serializer, only: serializer_t
    use polydem_series, only: series_t
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: forces_settings_t, settings_t
+   use polydem_start_findings, only: expected_impact_t, relaxation_t, static_pressure_t
+   use polydem_strings, only: counted
    use polydem_timers, only: timers_t
    use polydem_traffic, only: traffic_t
    use polydem_walls, only: walls_t
+   use polydem_warning, only: warning_t
    use polydem_loop_results, only: loop_results_t
    implicit none
    private
-   public :: simulation_t, participant_t, participant_item_t, relaxation_t, former_direction
+   public :: simulation_t, participant_t, participant_item_t, guard_t, guard_item_t, report_guard, serialize_guard
    public :: time_of, present_gravity, acts_on_all, compute_balance
    public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
@@ -32,44 +35,8 @@ module polydem_simulation
    !> Number of these elements
    integer, parameter :: n_sums = 4
 
-   !> Summary of the relaxation before time 0
-   type :: relaxation_t
-      !> Number of sweeps, 0 if no relaxation was necessary
-      integer(ip) :: sweeps = 0_ip
-      !> Depth of the deepest contact before and after, as a fraction of the thickness of the thinner body
-      real(wp) :: before = 0.0_wp, after = 0.0_wp
-      !> Greatest displacement of the centre of a body [m]
-      real(wp) :: move = 0.0_wp
-      !> Positions before the relaxation, allocated while it lasts, (2, slot) [m]
-      real(wp), allocatable :: from(:, :)
-   end type relaxation_t
-
-   !> The impact for which the time step is chosen
-   type :: expected_impact_t
-      !> Speed of approach [m/s]
-      real(wp) :: speed = 0.0_wp
-      !> Where the speed comes from
-      character(len=:), allocatable :: origin
-      !> Depth of the contact of two equal bodies, area over length [m]
-      real(wp) :: depth = 0.0_wp
-      !> Length of this contact [m], and its stable step over that without dashpots
-      real(wp) :: length = 0.0_wp, damped = 1.0_wp
-      !> Identifier of the body whose contacts limit the step; 0 if there is no free body
-      integer(lp) :: body = 0_lp
-   end type expected_impact_t
-
-   !> The greatest static pressure of the scene
-   type :: static_pressure_t
-      !> Pressure; 0: there is none [N/m2]
-      real(wp) :: greatest = 0.0_wp
-      !> Where it comes from
-      character(len=:), allocatable :: origin
-      !> Whether it is the weight of the free bodies
-      logical :: is_of_bodies = .false.
-   end type static_pressure_t
-
    !> What takes part in the steps of some runs beside bodies, contacts and integrator, such as loads, sources or a cell
-   !> that moves. All procedures do nothing by default, and all but `needs_table` are collective.
+   !> that moves. All procedures do nothing by default, and all but `needs_table` and `check_contacts` are collective.
    type, abstract :: participant_t
       !> Whether it needs all ranks after the forces, so that they agree on errors before
       logical :: needs_all_ranks = .false.
@@ -78,6 +45,7 @@ module polydem_simulation
       procedure :: change_bodies => change_nothing
       procedure :: begin_step => begin_nothing
       procedure :: needs_table => needs_no_table
+      procedure :: check_contacts => check_nothing
       procedure :: follow_forces => follow_nothing
       procedure :: end_step => end_nothing
       procedure :: serialize => serialize_nothing
@@ -90,10 +58,52 @@ module polydem_simulation
       class(participant_t), allocatable :: participant
    end type participant_item_t
 
+   !> A guard: a check during a run that stops it or warns, and what it has found. Each entry of &guards with the words
+   !> stop, warn and off has one. A new guard is a file, a line in `guard_list.f90` and an entry.
+   type, abstract :: guard_t
+      !> Entry of &guards, and its value: stop, warn or off
+      character(len=:), allocatable :: name, choice
+      !> Whether the value is not off
+      logical :: is_on = .true.
+      !> What a warning counts, 'step' or 'check', and what was found in it: the end of 'warnings: 3 steps '
+      character(len=:), allocatable :: noun, finding
+      !> Whether a check looks at the table of all contacts
+      logical :: needs_contacts = .false.
+      !> Whether all ranks find the same, and thus warn and stop alike
+      logical :: is_global = .false.
+      !> Whether a rank may stop the run in a step that is no check, without a message to others
+      logical :: stops_alone = .false.
+      !> Whether the present step is a check: guards that do not look in every step look now
+      logical :: is_check = .false.
+      !> Whether a guard of a rank asks in this step for a look of all ranks
+      logical :: is_asked = .false.
+      !> Warnings so far
+      type(warning_t) :: warning
+   contains
+      procedure(configure_guard), deferred :: configure
+      procedure :: start => start_no_guard
+      procedure :: set_local_limits => set_no_limits
+      procedure :: set_global_limits => set_no_limits
+      procedure :: respond_to_motion => ignore_motion
+      procedure :: asks
+      procedure(look_at), deferred :: look
+      procedure :: serialize => serialize_guard
+      procedure :: report => report_guard
+   end type guard_t
+
+   !> A guard of any kind
+   type :: guard_item_t
+      !> The guard
+      class(guard_t), allocatable :: guard
+   end type guard_item_t
+
    !> The complete state of a simulation on one rank
    type :: simulation_t
-      !> Settings of the run; gravity and drag of the group &forces are those of the present stage
+      !> Settings of the run, which do not change
       type(settings_t) :: settings
+      !> Parameters of the forces: those of the settings, with the stiffness that follows from the static pressure, and
+      !> gravity and drag of the present stage
+      type(forces_settings_t) :: forces
       !> Stages of the run
       type(run_stages_t) :: stages
       !> Communicator of the ranks that share the bodies
@@ -123,6 +133,8 @@ module polydem_simulation
       !> What takes part in the steps beside all this, in the order in which it acts. While a participant acts, the list
       !> is not here, so that it may change the simulation and itself
       type(participant_item_t), allocatable :: participants(:)
+      !> Guards in the order of their checks. While one looks, the list is not here
+      type(guard_item_t), allocatable :: guards(:)
       !> Forces on bodies that are no contacts
       type(body_forces_t) :: body_forces
       !> What moves the free bodies
@@ -155,9 +167,24 @@ module polydem_simulation
       integer(lp) :: sums(n_sums) = 0_lp
    end type simulation_t
 
-   !> What the guard against passing bodies remembers
-   type(history_kind_t), parameter :: former_direction = &
-      history_kind_t('direction', '1', 'direction at the last step, packed')
+   abstract interface
+      !> Set what the guard says of itself: the choice, and what the log counts.
+      subroutine configure_guard(self, settings)
+         import :: guard_t, settings_t
+         class(guard_t), intent(inout) :: self
+         type(settings_t), intent(in) :: settings
+      end subroutine configure_guard
+
+      !> Look at the simulation after a step, and stop or warn. Collective.
+      subroutine look_at(self, simulation, error)
+         import :: error_t, guard_t, simulation_t
+         class(guard_t), intent(inout) :: self
+         !> The simulation at the end of the step
+         type(simulation_t), intent(inout) :: simulation
+         !> Names body, position and step if the run must stop; on entry an error of another guard of this rank
+         type(error_t), allocatable, intent(inout) :: error
+      end subroutine look_at
+   end interface
 
 contains
 
@@ -173,7 +200,7 @@ contains
       type(simulation_t), intent(in) :: self
       real(wp) :: gravity(2)
 
-      gravity = self%settings%forces%gravity + self%loop%force_sums%acceleration
+      gravity = self%forces%gravity + self%loop%force_sums%acceleration
    end function present_gravity
 
    !> Whether a step leaves nothing out for bodies that nothing touches: forces act on all bodies, or the border of a
@@ -194,7 +221,7 @@ contains
       type(participant_item_t), allocatable :: list(:)
       integer :: k
 
-      call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
+      call evaluate_balance(self%energy_balance, self%comm, self%dt, self%forces%gravity, self%bodies, &
                             self%loop%force_sums, self%loop%walls, balance)
       call move_alloc(self%participants, list)
       do k = 1, size(list)
@@ -246,6 +273,19 @@ contains
       needs_no_table = .false.
    end function needs_no_table
 
+   !> Stop the run if the contacts of a step, before they act, are none to go on with. An error of one rank reaches all
+   !> ranks if `needs_all_ranks`.
+   subroutine check_nothing(self, simulation, error)
+      class(participant_t), intent(in) :: self
+      type(simulation_t), intent(in) :: simulation
+      !> Names the contact
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+      if (allocated(error)) return
+   end subroutine check_nothing
+
    !> Act on the forces of a step, before the bodies get their final velocities.
    subroutine follow_nothing(self, simulation, dt)
       class(participant_t), intent(inout) :: self
@@ -286,5 +326,63 @@ contains
       associate (unused_self => self, unused_simulation => simulation, unused_balance => balance)
       end associate
    end subroutine add_nothing
+
+   !> Record what a guard needs of the simulation at time 0, with the forces of its contacts. Collective.
+   subroutine start_no_guard(self, simulation)
+      class(guard_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+   end subroutine start_no_guard
+
+   !> Set what the step finds for a guard: motion beyond a limit, contacts that are flagged. The local limits depend on
+   !> the bodies of this rank, the global ones on those of all ranks (collective).
+   subroutine set_no_limits(self, simulation)
+      class(guard_t), intent(in) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+   end subroutine set_no_limits
+
+   !> Respond at once to a motion that is not finite or beyond the limit, of any guard.
+   subroutine ignore_motion(self, simulation, error)
+      class(guard_t), intent(inout) :: self
+      type(simulation_t), intent(in) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+      if (allocated(error)) return
+   end subroutine ignore_motion
+
+   !> Whether the guard of this rank has found something at which all ranks must look together; by default never.
+   logical function asks(self, simulation)
+      class(guard_t), intent(in) :: self
+      !> The simulation at the end of a step
+      type(simulation_t), intent(in) :: simulation
+
+      associate (unused_self => self, unused_simulation => simulation)
+      end associate
+      asks = .false.
+   end function asks
+
+   !> Serialize what the guard has found.
+   subroutine serialize_guard(self, serializer)
+      class(guard_t), intent(inout) :: self
+      class(serializer_t), intent(inout) :: serializer
+
+      call serializer%field('/run/'//self%name//'_warnings', self%warning%count, '1', self%noun//'s '//self%finding)
+   end subroutine serialize_guard
+
+   !> Line for the end of the log; empty if there is nothing to report
+   function report_guard(self) result(text)
+      class(guard_t), intent(in) :: self
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (self%warning%count > 0_lp) text = 'warnings: '//counted(self%warning%count, self%noun)//' '//self%finding
+   end function report_guard
 
 end module polydem_simulation

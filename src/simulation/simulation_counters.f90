@@ -5,6 +5,7 @@ module polydem_simulation_counters
    use polydem_counters, only: counters_t, over_steps
    use polydem_kinds, only: ip, lp
    use polydem_simulation, only: simulation_t, sum_contacts, sum_began, sum_ended, sum_degenerate
+   use polydem_wall_record, only: collect_record
    implicit none
    private
    public :: collect_counts, report_counters, count_contacts
@@ -18,7 +19,7 @@ contains
       integer(lp), allocatable :: counts(:)
 
       if (self%comm%size == 1_ip) return
-      call self%walls%record%collect(self%comm)
+      call collect_record(self%walls, self%comm)
       associate (value => self%search%neighbours%finder%work%value, n => size(self%sums))
          counts = [self%sums, value]
          call self%comm%all_reduce_sum(counts)

@@ -12,7 +12,8 @@ module polydem_time_step
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_list, only: pair_list_t
-   use polydem_participants, only: begin_step, change_bodies, end_step, follow_forces, need_all_ranks, need_table
+   use polydem_participants, only: begin_step, change_bodies, check_contacts, end_step, follow_forces, &
+      need_all_ranks, need_table
    use polydem_predict, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended, time_of
@@ -68,6 +69,7 @@ contains
          call timers%lap(stage_neighbours)
          call loop_over_contacts(self, self%dt, needs_table(self, tabulate), clock, error)
          call timers%divide_lap(stage_overlap, stage_forces, clock)
+         call check_contacts(self, error)
          call add_other_forces(self, error)
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
@@ -96,9 +98,10 @@ contains
       call place_images(self%search%maker%images, self%bodies%cell, self%search%boxes)
       if (.not. allocated(self%domain%reference)) return
       has_left = has_left .or. self%domain%is_off(self%bodies%cell)
-      do k = 1, size(self%walls%driven)
+      do k = 1, size(self%walls%wall)
+         if (.not. self%walls%wall(k)%is_driven()) cycle
          has_left = has_left .or. .not. have_boxes_within( &
-            self%search%maker, self%walls%driven(k)%slots, self%search%boxes, self%domain%rank_bounds%zone, &
+            self%search%maker, self%walls%wall(k)%slots, self%search%boxes, self%domain%rank_bounds%zone, &
             self%domain%reference)
       end do
    end subroutine bound_others
@@ -142,13 +145,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
+      call self%body_forces%apply(self%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
       if (.not. allocated(self%law%constraint)) return
-      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
+      call total_forces(self%forces%gravity, self%loop%force_sums, self%bodies)
       call self%law%constraint%apply(self%dt, self%loop%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
-      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%loop%force_sums)
-      call self%body_forces%apply(self%settings%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
+      call assemble_forces(self%forces%gravity, self%contacts, self%bodies, self%loop%force_sums)
+      call self%body_forces%apply(self%forces%gravity, time_of(self), self%bodies, self%loop%force_sums)
       call select_walls(self%bodies, self%contacts, self%loop%walls)
    end subroutine add_other_forces
 
@@ -162,9 +165,10 @@ contains
 
       call find_pairs(self, error)
       call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, error)
+      call check_contacts(self, error)
       call add_other_forces(self, error)
       if (allocated(error)) return
-      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
+      call total_forces(self%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine compute_forces
 
    !> After a failure, make the table of contacts of this step, and the forces on fixed bodies. Collective. The table
@@ -189,9 +193,10 @@ contains
          if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
          call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
          call loop_over_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
+         call check_contacts(self, known_error)
          call add_other_forces(self, known_error)
       end if
-      call total_forces(self%settings%forces%gravity, self%loop%force_sums, self%bodies)
+      call total_forces(self%forces%gravity, self%loop%force_sums, self%bodies)
    end subroutine tabulate_contacts
 
    !> Apply the moves of the pair list to the columns of the contact history.

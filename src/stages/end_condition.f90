@@ -62,7 +62,7 @@ contains
          case ('kinetic')
             call kinetic_energy(simulation%bodies, simulation%comm, value)
          case ('unbalanced')
-            call unbalanced_force(simulation%settings%forces%gravity, simulation%contacts, simulation%comm, &
+            call unbalanced_force(simulation%forces%gravity, simulation%contacts, simulation%comm, &
                                   simulation%bodies, simulation%loop%force_sums, value)
          case ('count')
             call count_grains(simulation%bodies, simulation%comm, stage%low, stage%high, value)

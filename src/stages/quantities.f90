@@ -68,7 +68,7 @@ contains
          call sums(2)%add(1.0_wp)
       end do
       do c = 1_ip, contacts%n
-         if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+         if (.not. owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) cycle
          force = contact_force(contacts, c)
          call sums(3)%add(hypotenuse(force(1), force(2)))
          call sums(4)%add(1.0_wp)
@@ -98,8 +98,8 @@ contains
          if (allocated(is_another)) then
             if (.not. is_another(c)) cycle
          end if
-         counts(1) = counts(1) + merge(1_lp, 0_lp, is_mine(bodies, contacts%first(c))) &
-                     + merge(1_lp, 0_lp, is_mine(bodies, contacts%second(c)))
+         counts(1) = counts(1) + merge(1_lp, 0_lp, is_mine(bodies, contacts%row(c)%first)) &
+                     + merge(1_lp, 0_lp, is_mine(bodies, contacts%row(c)%second))
       end do
       call comm%all_reduce_sum(counts)
       number = ratio(real(counts(1), wp), real(counts(2), wp))
@@ -117,7 +117,7 @@ contains
       allocate (is_another(contacts%n), source=.true.)
       allocate (pairs(contacts%n), order(contacts%n))
       do k = 1_ip, contacts%n
-         pairs(k) = ishft(int(contacts%first(k), lp), 32) + int(contacts%second(k), lp)
+         pairs(k) = ishft(int(contacts%row(k)%first, lp), 32) + int(contacts%row(k)%second, lp)
       end do
       order(:) = ascending_order(pairs)
       do k = 2_ip, contacts%n
@@ -186,12 +186,12 @@ contains
       integer(ip) :: c, copies(2)
 
       do c = 1_ip, contacts%n
-         copies = [copies_of(contacts%first(c)), copies_of(contacts%second(c))]
+         copies = [copies_of(contacts%row(c)%first), copies_of(contacts%row(c)%second)]
          if (all(copies == 0_ip)) cycle
          force = contact_force(contacts, c)
          call find_resultant(bodies, contacts, c, shift, couple)
-         call add(copies(1), contacts%arm_first(:, c) + shift, force)
-         call add(copies(2), contacts%arm_second(:, c) + shift, -force)
+         call add(copies(1), contacts%row(c)%arm_first + shift, force)
+         call add(copies(2), contacts%row(c)%arm_second + shift, -force)
       end do
       call all_reduce_exact_sums(comm, sums)
       tensor = reshape(-sums%value(), [2, 2])/area%size(1)/area%size(2)

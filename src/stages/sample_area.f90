@@ -3,6 +3,7 @@ module polydem_sample_area
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: text_t
+   use polydem_wall, only: number_of
    implicit none
    private
    public :: sample_area_t, find_area, has_area
@@ -61,8 +62,8 @@ contains
       type(simulation_t), intent(in) :: simulation
       real(wp) :: first(2), second(2)
 
-      first = simulation%walls%named%extent(pair(1), axis, simulation%bodies)
-      second = simulation%walls%named%extent(pair(2), axis, simulation%bodies)
+      first = simulation%walls%wall(pair(1))%extent(axis, simulation%bodies)
+      second = simulation%walls%wall(pair(2))%extent(axis, simulation%bodies)
       if (second(1) - first(2) >= first(1) - second(2)) then
          area%low(axis) = first(2)
          area%high(axis) = second(1)
@@ -80,13 +81,8 @@ contains
       !> Their names, (2)
       type(text_t), intent(in) :: names(:)
       integer(ip) :: pair(2)
-      integer(ip) :: k
 
-      pair = 0_ip
-      do k = 1_ip, size(simulation%walls%named%wall, kind=ip)
-         if (simulation%walls%named%wall(k)%name == names(1)%text) pair(1) = k
-         if (simulation%walls%named%wall(k)%name == names(2)%text) pair(2) = k
-      end do
+      pair = [number_of(names(1)%text, simulation%walls%wall), number_of(names(2)%text, simulation%walls%wall)]
    end function wall_pair
 
 end module polydem_sample_area

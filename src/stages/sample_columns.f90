@@ -24,7 +24,7 @@ contains
 
       call kinetic_energy(simulation%bodies, simulation%comm, value)
       call row%set('kinetic_energy', value, 'J/m', 'mean kinetic energy of a free body')
-      call unbalanced_force(simulation%settings%forces%gravity, simulation%contacts, simulation%comm, &
+      call unbalanced_force(simulation%forces%gravity, simulation%contacts, simulation%comm, &
                             simulation%bodies, simulation%loop%force_sums, value)
       call row%set('unbalanced_force', defined(value), '1', &
                    'mean total force on a free body over the mean force of a contact')
@@ -54,7 +54,7 @@ contains
          character(len=*), intent(in) :: name
          character(len=:), allocatable :: value
 
-         associate (number => real(row%value(index_of(name, row%name)), wp))
+         associate (number => real(row%value(index_of(name, row%label%name)), wp))
             value = '-'
             if (ieee_is_finite(number)) value = to_text(number, 3)
          end associate

@@ -16,10 +16,9 @@ module polydem_wall_load
    use polydem_kinds, only: ip, wp
    use polydem_motion, only: turn_about
    use polydem_named_values, only: named_values_t
-   use polydem_named_walls, only: named_walls_t
    use polydem_serializer, only: serializer_t
-   use polydem_wall_record, only: force_about
-   use polydem_wall_terms, only: wall_terms_t
+   use polydem_wall, only: gap, wall_t
+   use polydem_wall_terms, only: force_about, wall_terms_t
    implicit none
    private
    public :: wall_load_t, of_load, of_damping, of_contacts, of_kinetic, n_energies
@@ -66,7 +65,8 @@ contains
    pure subroutine set_masses(loads, walls, bodies, usual, stiffness)
       !> All loads
       type(wall_load_t), intent(inout) :: loads(:)
-      type(named_walls_t), intent(in) :: walls
+      !> All walls
+      type(wall_t), intent(in) :: walls(:)
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
       !> Mass of a wall without a mass of its own [kg/m]
@@ -79,7 +79,7 @@ contains
       do k = 1, size(loads)
          associate (load => loads(k))
             square = 1.0_wp
-            if (load%direction == along_angle) square = walls%gyration_square(load%wall, load%pivot, bodies)
+            if (load%direction == along_angle) square = walls(load%wall)%gyration_square(load%pivot, bodies)
             if (load%has_weight) load%heavy = merge(load%mass, usual, load%mass > 0.0_wp)
             call load%set_mass(usual, stiffness, square)
          end associate
@@ -103,13 +103,14 @@ contains
    pure subroutine carry_walls(loads, walls, bodies)
       !> All loads
       type(wall_load_t), intent(in) :: loads(:)
-      type(named_walls_t), intent(in) :: walls
+      !> All walls
+      type(wall_t), intent(in) :: walls(:)
       !> Bodies; poses, velocities and accelerations of those of the walls change
       type(bodies_t), intent(inout) :: bodies
       integer :: j, k
 
       do k = 1, size(loads)
-         associate (load => loads(k), slots => walls%wall(loads(k)%wall)%slots)
+         associate (load => loads(k), slots => walls(loads(k)%wall)%slots)
             if (load%direction == along_angle) then
                call turn_about(load%pivot, [load%place, load%speed, load%change], slots, bodies)
                cycle
@@ -126,7 +127,7 @@ contains
    end subroutine carry_walls
 
    !> Find the forces at the end of the step, and the velocities there. Collective: no rank may be absent.
-   subroutine correct_loads(loads, comm, dt, time, gravity, walls, bodies, terms)
+   subroutine correct_loads(loads, comm, dt, time, gravity, walls, wall_of, bodies, terms)
       !> All loads
       type(wall_load_t), intent(inout) :: loads(:)
       class(communicator_t), intent(inout) :: comm
@@ -136,13 +137,16 @@ contains
       real(wp), intent(in) :: time
       !> Acceleration of gravity at this time, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      type(named_walls_t), intent(in) :: walls
+      !> All walls
+      type(wall_t), intent(in) :: walls(:)
+      !> Wall of each body, (slot)
+      integer(ip), intent(in) :: wall_of(:)
       type(bodies_t), intent(in) :: bodies
       !> Contacts of this rank with fixed bodies
       type(wall_terms_t), intent(in) :: terms
       integer :: k
 
-      call find_contact_forces(loads, comm, walls, bodies, terms)
+      call find_contact_forces(loads, comm, wall_of, bodies, terms)
       do k = 1, size(loads)
          associate (load => loads(k))
             load%applied = applied_force(load, walls, bodies, time, gravity)
@@ -159,11 +163,12 @@ contains
    end subroutine correct_loads
 
    !> Find the force of the contacts along the direction of each load, and their number.
-   subroutine find_contact_forces(loads, comm, walls, bodies, terms)
+   subroutine find_contact_forces(loads, comm, wall_of, bodies, terms)
       !> All loads
       type(wall_load_t), intent(inout) :: loads(:)
       class(communicator_t), intent(inout) :: comm
-      type(named_walls_t), intent(in) :: walls
+      !> Wall of each body, (slot)
+      integer(ip), intent(in) :: wall_of(:)
       type(bodies_t), intent(in) :: bodies
       type(wall_terms_t), intent(in) :: terms
       type(exact_sum_t) :: sums(2*size(loads))
@@ -174,7 +179,7 @@ contains
       do c = 1_ip, terms%n
          do k = 1, size(loads)
             associate (s => terms%slots(1, c))
-               if (walls%wall_of(s) /= loads(k)%wall) cycle
+               if (wall_of(s) /= loads(k)%wall) cycle
                force = force_about(loads(k)%pivot, bodies, s, terms%term(:, c))
                call sums(2*k - 1)%add(force(loads(k)%direction))
                call sums(2*k)%add(1.0_wp)
@@ -191,7 +196,7 @@ contains
    !> Force [N/m] or torque [N] of a load and of gravity at a time; 0 while the wall is not controlled
    pure real(wp) function applied_force(load, walls, bodies, time, gravity) result(force)
       type(wall_load_t), intent(in) :: load
-      type(named_walls_t), intent(in) :: walls
+      type(wall_t), intent(in) :: walls(:)
       !> Bodies with turned vertices
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: time
@@ -203,7 +208,8 @@ contains
       force = 0.0_wp
       if (.not. load%is_open(time)) return
       width = load%width
-      if (all(load%between > 0_ip)) width = max(0.0_wp, walls%gap(load%between, 3 - load%direction, bodies))
+      if (all(load%between > 0_ip)) width = max(0.0_wp, gap(walls(load%between(1)), walls(load%between(2)), &
+                                                               3 - load%direction, bodies))
       ramp = load%ramp_at(time)
       force = (load%force + load%stress*width)*ramp%factor
       if (load%has_weight) force = force + weight_of(load, walls, bodies, gravity)
@@ -212,13 +218,13 @@ contains
    !> Force of gravity on a wall along the direction of a load [N/m], or its torque about the pivot [N]
    pure real(wp) function weight_of(load, walls, bodies, gravity) result(weight)
       type(wall_load_t), intent(in) :: load
-      type(named_walls_t), intent(in) :: walls
+      type(wall_t), intent(in) :: walls(:)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: gravity(2)
       real(wp) :: arm(2)
 
       if (load%direction == along_angle) then
-         arm = walls%centre_of_area(load%wall, bodies) - load%pivot
+         arm = walls(load%wall)%centre_of_area(bodies) - load%pivot
          weight = load%heavy*(arm(1)*gravity(2) - arm(2)*gravity(1))
       else
          weight = load%heavy*gravity(load%direction)
@@ -312,7 +318,8 @@ contains
    pure function wall_mobilities(loads, walls, bodies) result(mobility)
       !> All loads
       type(wall_load_t), intent(in) :: loads(:)
-      type(named_walls_t), intent(in) :: walls
+      !> All walls
+      type(wall_t), intent(in) :: walls(:)
       type(bodies_t), intent(in) :: bodies
       real(wp) :: mobility(bodies%n)
       real(wp) :: arm
@@ -320,9 +327,9 @@ contains
 
       mobility = 0.0_wp
       do k = 1, size(loads)
-         associate (slots => walls%wall(loads(k)%wall)%slots)
+         associate (slots => walls(loads(k)%wall)%slots)
             arm = 1.0_wp
-            if (loads(k)%direction == along_angle) arm = walls%greatest_arm(loads(k)%wall, loads(k)%pivot, bodies)
+            if (loads(k)%direction == along_angle) arm = walls(loads(k)%wall)%greatest_arm(loads(k)%pivot, bodies)
             mobility(slots) = mobility(slots) + real(max(1_ip, loads(k)%n_contacts), wp)*arm**2/loads(k)%mass
          end associate
       end do

@@ -100,6 +100,7 @@ BASE = Names(entries={"cell.stress_controlled": "cell.obeys",
                       **{f"motion.turn.{key}": f"scene.motion_{key}" for key in (
                           "bodies", "pivot", "rate", "velocity", "amplitude", "frequency", "start", "ramp")},
                       "motion.turn.kind": "scene.motion"},
+             data={"trajectory/frames/shear_offset": "frames/slid"},
              # The settings of a sample, as text
              removed=frozenset({"sample/case/input"}),
              places={"laboratory": "src/app/polydem"})

@@ -87,10 +87,16 @@ class Side:
             found.setdefault(entry.name, set()).update(entry.choices)
         return found
 
-    def translated(self, settings):
-        """Pairs of entries and values in the names of this revision; a former name only where it lacks the present."""
+    def translated(self, settings, namelist=None):
+        """Pairs of entries and values in the names of this revision; a former name only where it lacks the present.
+
+        With the text of a namelist, it lacks groups with a name that is not there.
+        """
         for entry, value in settings.items():
-            pairs = [(entry, value)] if self.lacks(entry, value) is None else self.names.pairs(entry, value)
+            instance = entry.split(".")[1]
+            is_there = namelist is None or entry.count(".") == 1 or f"'{instance}'" in namelist
+            has_it = is_there and self.lacks(entry, value) is None
+            pairs = [(entry, value)] if has_it else self.names.pairs(entry, value)
             for pair in pairs:
                 lacking = self.lacks(*pair)
                 if lacking is not None:
@@ -105,9 +111,9 @@ class Side:
             return entry
         return f"{entry} = {value}" if words and value.strip("'") not in words else None
 
-    def overrides(self, settings):
-        """Options --set."""
-        return [word for name, value in self.translated(settings)
+    def overrides(self, settings, namelist=None):
+        """Options --set, beside the text of a namelist."""
+        return [word for name, value in self.translated(settings, namelist)
                 for word in (self.names.option("--set"), f"{name}={value}")]
 
     def namelist(self, settings):
@@ -127,7 +133,8 @@ class Side:
             path = self.sources / self.names.place("inputs") / f"{case.source}.nml"
             if not path.exists():
                 raise UnknownError(f"no inputs/{case.source}.nml")
-            return ["run", str(path), *self.overrides({**case.settings, **where})]
+            text = path.read_text(encoding="utf-8")
+            return ["run", str(path), *self.overrides({**case.settings, **where}, text)]
         path = folder / "case.nml"
         path.write_text(self.namelist(case.settings), encoding="utf-8")
         return ["run", str(path), *self.overrides(where)]

@@ -1,7 +1,7 @@
 !> Checkpoints for fuzzing: one of a small run as fields to be spoilt, and a run that goes on from what came of them.
 module spoilt_checkpoint
    use hostile_fields, only: field_t, new_field
-   use polydem_checkpoint_fields, only: attempts_t, serialize_run
+   use polydem_checkpoint_fields, only: restarts_t, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_errors, only: error_t
    use polydem_file_checksum, only: append_checksum, checksum_length
@@ -43,7 +43,7 @@ contains
       type(field_t), allocatable :: fields(:)
       type(field_serializer_t) :: serializer
       type(simulation_t) :: simulation
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
       type(monitor_t) :: monitor
       type(error_t), allocatable :: error
 
@@ -51,8 +51,8 @@ contains
       call do_steps(simulation, steps_before, error)
       if (allocated(error)) error stop 'fuzz: the run of the checkpoint fails'
       allocate (serializer%fields(0))
-      attempts%scene = any_hash
-      call serialize_run(serializer, simulation, attempts, monitor)
+      restarts%scene = any_hash
+      call serialize_run(serializer, simulation, restarts)
       call move_alloc(serializer%fields, fields)
    end function sound_checkpoint
 
@@ -80,14 +80,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
       type(simulation_t) :: simulation
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
       type(monitor_t) :: monitor
 
       call begin(simulation, monitor, error)
-      attempts%scene = any_hash
+      restarts%scene = any_hash
       call file%open(path, error)
       if (allocated(error)) return
-      call serialize_run(file, simulation, attempts, monitor)
+      call serialize_run(file, simulation, restarts)
       call file%close(error)
       if (allocated(error)) error%message = path//' does not fit this run: '//error%message
       call do_steps(simulation, steps_after, error)

@@ -1,19 +1,20 @@
-"""The tables of the page: what breaks an invariance for a reason, and which pairs no scene has."""
+"""The tables of exceptions.txt: what breaks an invariance for a reason, and which pairs no scene has."""
 
 import re
 from pathlib import Path
 
 #: Where the tables are
-PAGE = Path(__file__).with_name("README.md")
+FILE = Path(__file__).with_name("exceptions.txt")
 
 
 def read_table(name):
-    """Rows of a table of the page: the capabilities of its first column, and the words of the second."""
-    table = PAGE.read_text(encoding="utf-8").split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
-    rows = re.findall(r"^\| `([\w +]+)` \| ([\w, ]+) \| .+ \|$", table, re.MULTILINE)
-    if len(rows) != table.count("\n|") - 2:
-        raise ValueError(f"README.md: the table of {name} was not understood")
-    return [(frozenset(tags.split(" + ")), word) for tags, words in rows for word in words.split(", ")]
+    """The table of a name: capabilities of the first column, several between commas, and words of the second."""
+    table = FILE.read_text(encoding="utf-8").partition(f"[{name}]\n")[2].partition("\n[")[0]
+    rows = re.findall(r"^([\w +,]+) \| ([\w, ]+) \| .+$", table, re.MULTILINE)
+    if not rows or len(rows) != len(table.split("\n")) - table.split("\n").count(""):
+        raise ValueError(f"{FILE.name}: the table of {name} was not understood")
+    return [(frozenset(tags.split(" + ")), word) for cell, words in rows
+            for tags in cell.split(", ") for word in words.split(", ")]
 
 
 def impossible_pairs():

@@ -1,7 +1,7 @@
 """The invariances: each makes of a scene another one whose answer is known, or says that it does not apply.
 
 A function gets the scene and dice, and gives a `Case`, or None. Whole capabilities that break an invariance for a
-reason stand in the table of README.md, and nowhere else.
+reason stand in exceptions.txt, and nowhere else.
 """
 
 import numpy as np

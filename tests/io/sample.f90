@@ -61,15 +61,15 @@ contains
       contacts%n = int(mod(step, 3_lp), ip)
       call reserve_contacts(contacts, contacts%n)
       do c = 1_ip, contacts%n
-         contacts%first(c) = 1_ip
-         contacts%second(c) = 3_ip
-         contacts%area(c) = real(step, wp) + real(c, wp)
-         contacts%arm_first(:, c) = [0.25_wp, real(c, wp)]
-         contacts%normal(:, c) = [0.0_wp, 0.125_wp]
-         contacts%depth(c) = contacts%area(c)/0.125_wp
-         contacts%direction(:, c) = [1.0_wp, 0.0_wp]
-         contacts%normal_force(c) = real(c, wp)
-         contacts%tangential_force(c) = -real(step, wp)
+         contacts%row(c)%first = 1_ip
+         contacts%row(c)%second = 3_ip
+         contacts%row(c)%area = real(step, wp) + real(c, wp)
+         contacts%row(c)%arm_first = [0.25_wp, real(c, wp)]
+         contacts%row(c)%normal = [0.0_wp, 0.125_wp]
+         contacts%row(c)%depth = contacts%row(c)%area/0.125_wp
+         contacts%row(c)%direction = [1.0_wp, 0.0_wp]
+         contacts%row(c)%normal_force = real(c, wp)
+         contacts%row(c)%tangential_force = -real(step, wp)
       end do
    end subroutine sample_contacts
 

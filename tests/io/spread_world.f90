@@ -137,7 +137,7 @@ contains
       integer(ip) :: c, i, j, code
 
       passive = bodies%fixed .or. bodies%in_halo
-      contacts%has_twist = .true.
+      contacts%has_couple = .true.
       call reserve_contacts(contacts, 3_ip*bodies%n)
       do i = 1_ip, bodies%n
          do j = i + 1_ip, bodies%n
@@ -145,22 +145,22 @@ contains
             if (passive(i) .and. passive(j)) cycle
             contacts%n = contacts%n + 1_ip
             c = contacts%n
-            contacts%pair(c) = c
-            contacts%first(c) = i
-            contacts%second(c) = j
+            contacts%row(c)%pair = c
+            contacts%row(c)%first = i
+            contacts%row(c)%second = j
             code = 100_ip*bodies%global_index(i) + bodies%global_index(j)
-            contacts%area(c) = some_number(step, code, 1_ip)
-            contacts%normal(:, c) = some_number(step, code, [2_ip, 3_ip])
-            contacts%arm_first(:, c) = some_number(step, code, [4_ip, 5_ip])
-            contacts%arm_second(:, c) = some_number(step, code, [6_ip, 7_ip])
-            contacts%direction(:, c) = some_number(step, code, [8_ip, 9_ip])
-            contacts%lever(c) = some_number(step, code, 10_ip)
-            contacts%normal_force(c) = some_number(step, code, 11_ip)
-            contacts%tangential_force(c) = some_number(step, code, 12_ip)
-            contacts%twist(c) = some_number(step, code, 13_ip)
+            contacts%row(c)%area = some_number(step, code, 1_ip)
+            contacts%row(c)%normal = some_number(step, code, [2_ip, 3_ip])
+            contacts%row(c)%arm_first = some_number(step, code, [4_ip, 5_ip])
+            contacts%row(c)%arm_second = some_number(step, code, [6_ip, 7_ip])
+            contacts%row(c)%direction = some_number(step, code, [8_ip, 9_ip])
+            contacts%row(c)%lever = some_number(step, code, 10_ip)
+            contacts%row(c)%normal_force = some_number(step, code, 11_ip)
+            contacts%row(c)%tangential_force = some_number(step, code, 12_ip)
+            contacts%row(c)%couple = some_number(step, code, 13_ip)
          end do
       end do
-      value = contacts%tangential_force(:contacts%n)
+      value = contacts%row(:contacts%n)%tangential_force
    end subroutine make_contacts
 
 end module spread_world

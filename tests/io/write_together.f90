@@ -94,7 +94,7 @@ contains
       if (comm%size == 1_ip) call whole_world(step, world)
       if (comm%size > 1_ip) call part_of_world(step, comm%rank, comm%size, world)
       call select_walls(world%bodies, world%contacts, walls)
-      call complete_wall_forces(comm, world%contacts%first, walls, world%bodies)
+      call complete_wall_forces(comm, world%contacts%row%first, walls, world%bodies)
    end subroutine make_part
 
    subroutine write_all(comm, folder, error)
@@ -135,7 +135,7 @@ contains
          call file%set_rows('/bodies/', rows)
          call order_vertices(comm, bodies, rows)
          call file%set_rows('/vertices/', rows)
-         call order_pairs(comm, bodies, pairs%first(:n), pairs%second(:n), rows)
+         call order_pairs(comm, bodies, pairs%row(:n)%first, pairs%row(:n)%second, rows)
          call file%set_rows('/pairs/', rows)
          ! The group /run has the values of the root rank.
          sums = [4_lp, 5_lp] + int(comm%rank, lp)
@@ -145,8 +145,8 @@ contains
          call file%field('/bodies/angle', bodies%angle, 'rad', 'angles')
          call file%field('/bodies/force', bodies%force, 'N/m', 'forces')
          call file%field('/vertices/position', bodies%pieces%vertex, 'm', 'vertices')
-         call file%match('/pairs/first', int(bodies%id(pairs%first(:n)), lp), '1', 'lower identifier')
-         call file%match('/pairs/second', int(bodies%id(pairs%second(:n)), lp), '1', 'higher identifier')
+         call file%match('/pairs/first', int(bodies%id(pairs%row(:n)%first), lp), '1', 'lower identifier')
+         call file%match('/pairs/second', int(bodies%id(pairs%row(:n)%second), lp), '1', 'higher identifier')
          call file%field('/pairs/tangential', world%pair_value, 'N/m', 'memory')
       end associate
       call file%complete(error)
@@ -206,7 +206,7 @@ contains
             call raise(error, run_error, 'rank '//to_text(comm%rank)//' read a wrong pose of body '// &
                        to_text(bodies%id(s)))
          end do
-         if (second(1) /= int(whole%bodies%id(contacts%second(contacts%n - comm%rank)), lp)) &
+         if (second(1) /= int(whole%bodies%id(contacts%row(contacts%n - comm%rank)%second), lp)) &
             call raise(error, run_error, 'rank '//to_text(comm%rank)//' read a wrong pair')
       end associate
       call comm%all_reduce_error(error)

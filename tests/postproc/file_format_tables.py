@@ -30,6 +30,9 @@ FILES = {"trajectory": ("trajectory_0001.h5", ()), "profile": ("profile.h5", ())
          "checkpoint": ("checkpoint_1.h5", ("checkpoint.steps=50",)), "trace": ("trace.h5", ("output.trace_steps=13",)),
          "steps": ("steps.h5", ("output.step_profile=.true.",))}
 
+#: Those whose table is on the page; h5dump shows the others, whose data sets have the same attributes
+ON_THE_PAGE = ("trajectory", "trace")
+
 
 def write_file(program, table, folder):
     """Let the program write the file of a table."""
@@ -97,7 +100,7 @@ def main():
     program = Path(sys.argv[1]).resolve()
     text = PAGE.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
-        for table in FILES:
+        for table in ON_THE_PAGE:
             part = part_of(text, table)
             new = table_of(write_file(program, table, Path(folder)))
             text = text[:part.start(2)] + new + text[part.end(2):]

@@ -51,7 +51,7 @@ def disagreements(folder):
         if row["claim"] not in reasons:  # a part of the claim above
             continue
         reason = reasons[row["claim"]]["reason"]
-        said = f"**{row['claim']}** {row['says']}. *Rule:* {reasons[row['claim']]['rule']}. " \
+        said = f"* **{row['claim']}** {row['says']}. *Rule:* {reasons[row['claim']]['rule']}. " \
                f"*Verdict:* {row['verdict']}. {'' if reason == '-' else reason}".rstrip()
         if said not in page.splitlines():
             found.append(f"reason of {row['claim']}")

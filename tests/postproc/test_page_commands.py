@@ -55,7 +55,7 @@ def test_the_commands_of_a_page_work(name, tmp_path):
         if block.language in FILES:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
         if block.language in ("sh", "python") and block.commands is not None:
-            run_block(tmp_path, block.remarks.get("tests run first", "true"), "sh")
+            run_block(tmp_path, block.notes.get("tests run first", "true"), "sh")
             run_block(tmp_path, block.commands, block.language)
 
 
@@ -99,7 +99,7 @@ VARIANT = "<!-- tests run: true -->\n"
     "```sh\ntrue\n```\n<!-- tests do not run this: takes a week on one core\n",
     "```f90\nend\n```\n<!-- tests run first: true -->\n",
     "```sh\ntrue\n"])
-def test_a_remark_that_matches_no_commands_is_found(text):
+def test_a_note_that_matches_no_commands_is_found(text):
     with pytest.raises(PageError):
         blocks_of(text)
 
@@ -111,16 +111,16 @@ def test_the_tests_that_excuses_name_exist():
     for path in (ROOT / "tests").rglob("CMakeLists.txt"):  # also those that another build has
         known |= set(re.findall(r"\bNAME (\w+)", path.read_text(encoding="utf-8")))
     named = {name for page in PAGES for block in blocks_of(page.read_text(encoding="utf-8"))
-             for name in re.findall(r"tests? `(\w+)`", block.remarks.get("tests do not run this", ""))}
+             for name in re.findall(r"tests? `(\w+)`", block.notes.get("tests do not run this", ""))}
     assert len(named) > 5 and named - known == set()
 
 
 def test_an_excuse_of_commands_is_accepted():
-    block, = blocks_of("```sh\n# a remark\n./polydem run inputs/drum.nml\n```\n" + EXCUSE)
+    block, = blocks_of("```sh\n# a note\n./polydem run inputs/drum.nml\n```\n" + EXCUSE)
     assert block.commands is None
 
 
 def test_a_variant_has_more_words():
-    block, = blocks_of("```sh\n./polydem run a.nml   # a remark\n```\n"
+    block, = blocks_of("```sh\n./polydem run a.nml   # a note\n```\n"
                        "<!-- tests run: ./polydem run --threads 1 a.nml --set integrate.duration=1 -->\n")
     assert block.commands == "./polydem run --threads 1 a.nml --set integrate.duration=1\n"

@@ -256,6 +256,9 @@ def test_tables_compare_all_codes(tmp_path):
     rows = {row[1]: row[2:] for row in table_of(found, "cheapest", tmp_path).rows}
     assert rows["0.01"] == ("3.2e-01", "6.3e-02", "8.7e-05", "4.0e-04", "3.7e+03")
     assert rows["0.0001"][2:] == ("-", "6.4e-03", "never")
+    ratios = table_of(found, "ratios", tmp_path)
+    assert ratios.heading == ("problem", "0.1", "0.01", "0.001", "0.0001")
+    assert [(row[0], row[2], row[4]) for row in ratios.rows] == [("slide", "3.7e+03", "never")]
     assert table_of(found, "least", tmp_path).rows == [("slide", "3.2e-03", "1.0e-05", "1.0e-03", "1.0e-04", "-")]
     orders = {row[1]: row[-1] for row in table_of(found, "stiffness", tmp_path).rows}
     assert orders == {"default": "0.50", "polar": "1.0"}

@@ -3,8 +3,9 @@
 usage: check_recipes.py ROOT BUILD NINJA
 
 In a copy of src, each file of the folder examples goes to the place of the same name that the pages say, and diff
-blocks change the last file named before them. The changed files are compiled with the flags of BUILD against its
-modules, linked before its libraries, and run by try_recipes.f90. All output goes to a temporary folder.
+blocks change the last file named before them. The copy is built as a whole, as new entries and columns change types
+that most files use, without optimisation and with warnings as errors. Its libraries are linked to try_recipes.f90, and
+its program does a run whose frames the Python package reads. All output goes to a temporary folder.
 """
 
 import json
@@ -24,8 +25,21 @@ PAGES = ("recipes.md", "recipes_scenes.md")
 #: The most files that each recipe may touch; the list of CMake and the table of entries, from which sources are made,
 #: do not count
 MOST = {"A neighbour finder": 2, "A force part": 2, "A force on bodies": 2, "A motion of walls": 2, "A guard": 2,
-        "An integrator": 2, "A participant of the step": 2, "A quantity of the series": 2,
-        "A condition that ends a stage": 2, "A shape of grains": 2}
+        "An integrator": 2, "A column of the contact table": 3, "A participant of the step": 2,
+        "A quantity of the series": 2, "A condition that ends a stage": 2, "A shape of grains": 2}
+#: What the build of the copy needs beside src
+ALSO = ("CMakeLists.txt", "LICENSE", "README.md", "CITATION.cff")
+#: A block that slides on a floor with this speed [m/s], on which it rests at the start
+SPEED = 0.25
+SLIDE = f"""&grains name = 'g' region = 'at' at = 0, 0.0049999 shape = 'rectangle' width = 0.01 height = 0.01
+ velocity = {SPEED}, 0 /
+&wall name = 'w' outline = 'rectangle' low = -0.1, -0.01 high = 0.1, 0 /
+&integrate duration = 1e-4 dt = 1e-5 / &output frame_interval = 1e-4 contacts = .true. folder = 'slide' /
+"""
+#: Prints the slip velocity of the contacts of the first frame
+READ = ("from polydem_post import Trajectory\n"
+        "contacts = Trajectory('slide')[0].contacts\n"
+        "print(*contacts.others['slip'])\n")
 
 
 class RecipeError(Exception):
@@ -90,55 +104,62 @@ def apply_recipes(root, copy):
     return touched
 
 
-def commands_of(build):
-    """Compile command and working folder of each source, by path."""
+def call(words, folder, wrong, **options):
+    """Run a command in a folder; return what it prints."""
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False, **options)
+    if done.returncode != 0:
+        raise RecipeError(f"{wrong}:\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
+    return done.stdout
+
+
+def build_copy(root, copy, build, ninja):
+    """Build the program of the copy in the precision of a build; return the build folder."""
+    for name in ALSO:
+        shutil.copy(os.path.join(root, name), copy)
+    with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as stream:
+        known = [line.strip() for line in stream if re.match("POLYDEM_PRECISION:|CMAKE_Fortran_COMPILER:", line)]
+    new = os.path.join(copy, "build")
+    call(["cmake", "-S", copy, "-B", new, "-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={ninja}", "-DPOLYDEM_TESTS=OFF",
+          "-DCMAKE_FIND_USE_PACKAGE_REGISTRY=OFF", "-DCMAKE_Fortran_FLAGS_RELEASE=-O0 -Werror",
+          *(f"-D{line}" for line in known)], copy, "the copy cannot be configured")
+    call([ninja, "-C", new, "src/app/polydem"], copy, "the copy does not compile")
+    return new
+
+
+def build_program(root, build, new, ninja, folder):
+    """Compile the program of this test against the modules of the copy, and link it with its libraries."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as stream:
-        return {entry["file"]: (shlex.split(entry["command"]), entry["directory"]) for entry in json.load(stream)}
-
-
-def compile_file(source, like, commands, modules, folder):
-    """Compile a file with the flags of another file, with the modules of this test first; return the object."""
-    words, directory = commands[like]
-    target = os.path.join(folder, os.path.basename(source) + ".o")
-    # The module folder of the layer becomes a search folder.
-    flags = [re.sub("^-J", "-I", word) for word in words[1:words.index("-c")]]
-    done = subprocess.run([words[0], f"-I{modules}", *flags, "-Werror", f"-J{modules}", "-c", source, "-o", target],
-                          cwd=directory, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise RecipeError(f"{source} does not compile:\n{done.stderr[:4000]}")
-    return target
-
-
-def build_program(root, touched, copy, build, ninja, folder):
-    """Compile the files that the recipes touch, and link them with the libraries of the build."""
-    commands = commands_of(build)
-    modules = os.path.join(folder, "modules")
-    os.mkdir(modules)
-    # The table makes sources, which differ from those of the build.
-    config, made = os.path.join(copy, "src", "config"), os.path.join(folder, "made")
-    subprocess.run([sys.executable, os.path.join(config, "make_entries.py"), os.path.join(config, "entries.txt"), made],
-                   check=True)
-    plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
-    for files in touched.values():
-        # New files before those that use them, with the flags of their layer
-        known = [path for path in files if os.path.exists(os.path.join(root, path))]
-        new = [path for path in files if path not in known]
-        plan += [(os.path.join(copy, path), os.path.join(root, known[0])) for path in new]
-        plan += [(os.path.join(copy, path), os.path.join(root, path)) for path in known]
+        entries = {entry["file"]: entry for entry in json.load(stream)}
     trial = os.path.join(root, "tests", "verification", "trial.f90")
-    serial = os.path.join(root, "tests", "simulation", "serial_simulation.f90")
-    plan += [(serial, trial), (trial, trial), (os.path.join(root, "tests", "recipes", "try_recipes.f90"), trial)]
-    objects = [compile_file(path, like, commands, modules, folder) for path, like in plan]
-    output = subprocess.run([ninja, "-C", build, "-t", "commands", "tests/verification/verify"], capture_output=True,
-                            text=True, check=True).stdout
+    words, directory = shlex.split(entries[trial]["command"]), entries[trial]["directory"]
+    layers = os.path.join(build, "layers")
+    # The module folder of the tests becomes a search folder, behind that of this program and those of the layers.
+    flags = [re.sub("^-J", "-I", word).replace(layers, os.path.join(new, "layers"))
+             for word in words[1:words.index("-c")]]
+    objects = []
+    for source in (os.path.join(root, "tests", "simulation", "serial_simulation.f90"), trial,
+                   os.path.join(root, "tests", "recipes", "try_recipes.f90")):
+        objects.append(os.path.join(folder, os.path.basename(source) + ".o"))
+        call([words[0], f"-I{folder}", *flags, "-Werror", f"-J{folder}", "-c", source, "-o", objects[-1]], directory,
+             f"{source} does not compile")
+    output = call([ninja, "-C", build, "-t", "commands", "tests/verification/verify"], build, "ninja -t commands")
     words = shlex.split(output.strip().split("\n")[-1].replace(": && ", "").replace(" && :", ""))
-    libraries = words[words.index("-o") + 2:]
+    libraries = [os.path.join(build, word) if word.startswith("tests/") else word
+                 for word in words[words.index("-o") + 2:]]
     program = os.path.join(folder, "try_recipes")
-    done = subprocess.run([words[0], "-fopenmp", *objects, "-o", program, *libraries], cwd=build, capture_output=True,
-                          text=True, check=False)
-    if done.returncode != 0:
-        raise RecipeError(f"the program does not link:\n{done.stderr[:4000]}")
+    call([words[0], "-fopenmp", *objects, "-o", program, *libraries], new, "the program does not link")
     return program
+
+
+def slip_in_python(root, new, folder):
+    """The column of the contact table in the first frame of a run, as the Python package reads it."""
+    with open(os.path.join(folder, "slide.nml"), "w", encoding="utf-8") as stream:
+        stream.write(SLIDE)
+    call([os.path.join(new, "src", "app", "polydem"), "run", "slide.nml"], folder, "the run with the column fails")
+    python = os.path.join(root, ".venv", "bin", "python")
+    environment = {**os.environ, "PYTHONPATH": os.path.join(root, "postproc", "src"), "PYTHONDONTWRITEBYTECODE": "1"}
+    return call([python if os.path.exists(python) else sys.executable, "-c", READ], folder,
+                "Python does not read the column", env=environment)
 
 
 #: Values that the program prints, each with what it should be, the tolerance, and what is wrong otherwise. The area
@@ -149,6 +170,7 @@ WANTED = (
     ("conservative_restitution", (0.5,), 1e-3, "conservative: the restitution is not 1/2"),
     ("conservative_damping_work", (-0.75,), 2e-3, "conservative: damping does not dissipate 3/4 of the energy"),
     ("stable_step_share", (0.5,), 1e-12, "four times the stiffness does not halve the stable step"),
+    ("plasticity", (3.5, 7.0), 1e-12, "the parameter of the force part is not that of the pair of materials"),
     ("magnus", (0.5 * 3.0 * 0.4, 0.0), 1e-5,
      "the force on bodies does not turn the velocity with its rate, or does work"),
     ("orbit", (0.0, 0.0), 1e-12, "the motion does not lead to the point of its circle"),
@@ -185,12 +207,13 @@ def main(root, build, ninja):
         copy = os.path.join(folder, "copy")
         shutil.copytree(os.path.join(root, "src"), os.path.join(copy, "src"))
         try:
-            touched = apply_recipes(root, copy)
-            program = build_program(root, touched, copy, build, ninja, folder)
-            done = subprocess.run([program], cwd=folder, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise RecipeError(f"the program ended with {done.returncode}:\n{done.stdout}{done.stderr}")
-            judge(done.stdout)
+            apply_recipes(root, copy)
+            new = build_copy(root, copy, build, ninja)
+            judge(call([build_program(root, build, new, ninja, folder)], folder, "the program fails"))
+            slip = [float(word) for word in slip_in_python(root, new, folder).split()]
+            print("slip", *slip)
+            if len(slip) != 1 or abs(slip[0] + SPEED) > 1e-12:
+                raise RecipeError("the column of the contact table is not the slip velocity")
         except RecipeError as error:
             print(f"recipes: {error}")
             return 1

@@ -10,6 +10,7 @@ program try_recipes
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
    use polydem_named_values, only: named_values_t
+   use polydem_pair_parameters, only: pair_parameters, pair_parameters_t
    use polydem_monitor, only: check_step, monitor_t, new_monitor
    use polydem_read_settings, only: read_settings_text
    use polydem_sample_columns, only: set_sample_columns
@@ -26,6 +27,7 @@ program try_recipes
    call hit_plate('area')
    call hit_plate('conservative')
    call compare_stiffness()
+   call mix()
    call run_gas('all_pairs')
    call run_gas('plain_loop')
    call turn()
@@ -47,7 +49,7 @@ contains
       real(wp) :: energy, stored
       integer :: k
 
-      call start(law, 'damping = ''walton_braun'' damping_coefficient = 3', simulation, error)
+      call start(law, 'damping = ''walton_braun'' plasticity = 3', simulation, error)
       if (failed(error)) return
       energy = 0.5_wp*simulation%bodies%mass(1)*speed**2
       stored = 0.0_wp
@@ -70,10 +72,27 @@ contains
       type(error_t), allocatable :: error
 
       call start('area', 'damping = ''none''', simple, error)
-      call start('area', 'damping = ''walton_braun'' damping_coefficient = 3', stiff, error)
+      call start('area', 'damping = ''walton_braun'' plasticity = 3', stiff, error)
       if (failed(error)) return
       print '(a, es24.16)', 'stable_step_share ', stiff%expected_stable_step/simple%expected_stable_step
    end subroutine compare_stiffness
+
+   !> Print the parameter of the example part for a pair of two materials, and for a pair that states its own.
+   subroutine mix()
+      character(len=*), parameter :: text = '&scene name = ''gas'' bodies = 60 speed = 1 '// &
+         'material = ''a'' / &material name = ''a'' plasticity = 2 / &material name = ''b'' plasticity = 5 / '// &
+         '&contact_pair name = ''aa'' materials = ''a'', ''a'' plasticity = 7 / '// &
+         '&forces damping = ''walton_braun'' / &integrate duration = 1 /'
+      character(len=1) :: no_overrides(0)
+      type(settings_t) :: settings
+      type(pair_parameters_t) :: pairs
+      type(error_t), allocatable :: error
+
+      call read_settings_text('mixed.nml', text, no_overrides, settings, error)
+      if (failed(error)) return
+      pairs = pair_parameters(settings, settings%forces)
+      print '(a, 2es24.16)', 'plasticity', pairs%plasticity%of([1_ip, 2_ip]), pairs%plasticity%of([1_ip, 1_ip])
+   end subroutine mix
 
    !> Start a square above a fixed plate.
    subroutine start(law, damping, simulation, error)
@@ -114,7 +133,7 @@ contains
       type(error_t), allocatable :: error
 
       call list%append(block_at(0.0_wp, 0.0_wp, side, side, 0.0_wp), velocity=[1.0_wp, 0.0_wp], angular_velocity=3.0_wp)
-      call begin('&forces gravity = 0, 0 damping = ''none'' / &integrate duration = 1 dt = 1e-3 /', &
+      call begin('&forces gravity = 0, 0 magnus = 0.5 / &integrate duration = 1 dt = 1e-3 /', &
                  list, simulation, error)
       if (failed(error)) return
       call steps(simulation, 400, error)
@@ -141,7 +160,7 @@ contains
       if (failed(error)) return
       call steps(simulation, 1875, error)
       if (failed(error)) return
-      associate (slots => simulation%walls%driven(1)%slots)
+      associate (slots => simulation%walls%wall(1)%slots)
          print '(a, 2es24.16)', 'orbit', (simulation%bodies%position(:, slots(1)) &
                                           - ([0.0_wp, -0.5_wp] + 0.5_wp*[-root - 1.0_wp, root]))/0.5_wp
       end associate
@@ -201,7 +220,8 @@ contains
       if (failed(error)) return
       call measure_condition(simulation)
       call set_sample_columns(simulation, row)
-      print '(a, 2es24.16)', 'greatest_speed', row%value(index_of('greatest_speed', row%name)), simulation%stages%value
+      print '(a, 2es24.16)', 'greatest_speed', row%value(index_of('greatest_speed', row%label%name)), &
+         simulation%stages%value
    end subroutine speed_up
 
    !> Print the area of a triangle.
@@ -242,7 +262,7 @@ contains
             call check_step(monitor, simulation, .false., log, error)
             if (failed(error)) return
          end do
-         associate (last => monitor%list(size(monitor%list))%guard)
+         associate (last => simulation%guards(size(simulation%guards))%guard)
             counts(n) = int(last%warning%count, ip)
          end associate
       end do

@@ -308,8 +308,8 @@ def last_bodies(folder, frame):
     with h5py.File(os.path.join(folder, files[0 if frame >= 0 else -1])) as file:
         found = {name: file["frames"][name][frame] for name in ("position", "velocity")}
         path = found["position"] + file["frames/image"][frame] * file["cell/size"][:]
-        if "slid" in file["frames"]:
-            path[:, 0] += file["frames/slid"][frame]
+        if "shear_offset" in file["frames"]:
+            path[:, 0] += file["frames/shear_offset"][frame]
     return {**found, "path": path}
 
 

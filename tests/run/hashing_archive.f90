@@ -1,6 +1,6 @@
 !> A serializer that only hashes the fields of a state: two states are equal if their hashes are equal.
 module hashing_archive
-   use polydem_checkpoint_fields, only: attempts_t, serialize_run
+   use polydem_checkpoint_fields, only: restarts_t, serialize_run
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, lp
    use polydem_monitor, only: monitor_t, new_monitor
@@ -27,11 +27,11 @@ contains
       type(simulation_t), intent(inout) :: simulation
       integer(lp) :: hash
       type(hashing_serializer_t) :: serializer
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
       type(monitor_t) :: monitor
 
       call new_monitor(monitor, simulation)
-      call serialize_run(serializer, simulation, attempts, monitor)
+      call serialize_run(serializer, simulation, restarts)
       hash = serializer%hash
    end function hash_of_everything
 

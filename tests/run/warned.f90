@@ -13,7 +13,7 @@ module warned
 
 contains
 
-   !> All warnings of a simulation at time 0, one per line; behind them a remark if their number is wrong
+   !> All warnings of a simulation at time 0, one per line; behind them a note if their number is wrong
    function warnings_about(simulation) result(warnings)
       !> The simulation
       type(simulation_t), intent(inout) :: simulation

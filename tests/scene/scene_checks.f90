@@ -6,7 +6,6 @@ module scene_checks
    use polydem_read_settings, only: read_settings_text
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
-   use polydem_wall, only: wall_t
    use polydem_walls, only: walls_t
    implicit none
    private
@@ -25,29 +24,38 @@ contains
       type(error_t), allocatable, intent(out) :: error
       !> Settings
       type(settings_t), intent(out), optional :: settings
-      !> Moving walls
-      type(wall_t), allocatable, intent(out), optional :: walls(:)
+      !> Motions, and the walls that they or loads drive
+      type(walls_t), intent(out), optional :: walls
       type(settings_t) :: own_settings
       type(walls_t) :: own_walls
       character(len=8) :: no_overrides(0)
+      integer :: k
 
       call read_settings_text('test.nml', '&scene '//entries//' /'//new_line('a') &
                               //'&integrate duration = 1 /'//new_line('a'), no_overrides, own_settings, error)
       if (.not. allocated(error)) call build_scene(own_settings, bodies, own_walls, error)
       if (present(settings)) settings = own_settings
-      if (present(walls) .and. .not. allocated(error)) call move_alloc(own_walls%driven, walls)
+      if (.not. present(walls) .or. allocated(error)) return
+      walls = own_walls
+      walls%wall = own_walls%wall(pack([(k, k=1, size(own_walls%wall))], &
+                                       [(own_walls%wall(k)%is_driven(), k=1, size(own_walls%wall))]))
    end subroutine make_scene
 
    !> Kinds of the motions of a wall, separated by blanks
-   function kinds_of(wall) result(text)
-      type(wall_t), intent(in) :: wall
+   function kinds_of(walls, number) result(text)
+      !> Walls with their motions
+      type(walls_t), intent(in) :: walls
+      !> Number of the wall
+      integer, intent(in) :: number
       character(len=:), allocatable :: text
       integer :: k
 
       text = ''
-      do k = 1, size(wall%motions)
-         text = text//' '//wall%motions(k)%motion%kind
-      end do
+      associate (motions => walls%wall(number)%motions)
+         do k = 1, size(motions)
+            text = text//' '//walls%motions(motions(k))%motion%kind
+         end do
+      end associate
       text = trim(adjustl(text))
    end function kinds_of
 

@@ -1,7 +1,7 @@
-!> What the guards of a monitor found.
+!> What the guards of a simulation found.
 module guard_findings
    use polydem_kinds, only: wp
-   use polydem_monitor, only: monitor_t
+   use polydem_simulation, only: simulation_t
    use polydem_step_guard, only: step_guard_t
    implicit none
    private
@@ -10,13 +10,13 @@ module guard_findings
 contains
 
    !> Greatest dt / stable dt so far
-   pure real(wp) function greatest_share(monitor)
-      type(monitor_t), intent(in) :: monitor
+   pure real(wp) function greatest_share(simulation)
+      type(simulation_t), intent(in) :: simulation
       integer :: k
 
       greatest_share = -1.0_wp
-      do k = 1, size(monitor%list)
-         select type (guard => monitor%list(k)%guard)
+      do k = 1, size(simulation%guards)
+         select type (guard => simulation%guards(k)%guard)
          type is (step_guard_t)
             greatest_share = guard%greatest
          end select
@@ -24,14 +24,14 @@ contains
    end function greatest_share
 
    !> Number of warnings of the guard of an entry
-   integer function warnings_of(monitor, name)
-      type(monitor_t), intent(in) :: monitor
+   integer function warnings_of(simulation, name)
+      type(simulation_t), intent(in) :: simulation
       character(len=*), intent(in) :: name
       integer :: k
 
       warnings_of = -1
-      do k = 1, size(monitor%list)
-         if (monitor%list(k)%guard%name == name) warnings_of = int(monitor%list(k)%guard%warning%count)
+      do k = 1, size(simulation%guards)
+         if (simulation%guards(k)%guard%name == name) warnings_of = int(simulation%guards(k)%guard%warning%count)
       end do
    end function warnings_of
 

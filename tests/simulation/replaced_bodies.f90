@@ -19,7 +19,6 @@ program replaced_bodies
    use polydem_hdf5_file, only: start_library
    use polydem_kinds, only: ip, lp, wp
    use polydem_posix_processes, only: c_exit
-   use polydem_motion, only: motion_item_t
    use polydem_oscillation, only: oscillation_t
    use polydem_read_settings, only: read_settings_text
    use polydem_replace_bodies, only: replace_bodies
@@ -28,7 +27,6 @@ program replaced_bodies
    use polydem_simulation_counters, only: collect_counts, count_contacts
    use polydem_start_simulation, only: start_with_bodies
    use polydem_time_step, only: advance
-   use polydem_wall, only: new_wall
    use polydem_world_communicator, only: create_world
    implicit none
 
@@ -141,7 +139,7 @@ contains
       call make(comm, .false., .true., added)
       call replace(simulation, [4_ip, 11_ip, n_pile - 1_ip], added)
       if (allocated(error)) return
-      call expect(size(simulation%walls%driven(1)%slots) == 1, 'a wall keeps a body that left')
+      call expect(size(simulation%walls%wall(1)%slots) == 1, 'a wall keeps a body that left')
       call go_on(simulation, n_steps)
       call hash_all(simulation, hash)
       call expect_contacts(simulation)
@@ -187,7 +185,6 @@ contains
       type(simulation_t), intent(out) :: simulation
       type(settings_t) :: settings
       type(oscillation_t) :: motion
-      type(motion_item_t) :: items(1)
       integer(ip), allocatable :: slots(:)
       integer(ip) :: s
 
@@ -195,11 +192,12 @@ contains
       if (allocated(error)) return
       call make(comm, with_pile, with_far, simulation%bodies)
       slots = pack([(s, s=1_ip, simulation%bodies%n)], simulation%bodies%fixed)
-      allocate (simulation%walls%driven(merge(1, 0, with_pile)))
+      allocate (simulation%walls%wall(0), simulation%walls%motions(1))
       motion%amplitude = [1.0e-3_wp, 5.0e-4_wp]
       motion%frequency = 400.0_wp
-      allocate (items(1)%motion, source=motion)
-      if (with_pile) call new_wall(simulation%walls%driven(1), items, simulation%bodies, slots(2:))
+      allocate (simulation%walls%motions(1)%motion, source=motion)
+      if (with_pile) call simulation%walls%append(simulation%bodies, &
+         simulation%bodies%id(slots(2:)), [1], [integer ::])
       call start_with_bodies(settings, comm, simulation, error)
       call comm%all_reduce_error(error)
    end subroutine start

@@ -24,6 +24,8 @@ FORBIDDEN = [(re.compile(pattern), re.compile(allowed), message) for pattern, al
      "the folders app, laboratory and run set the threads"),
     (r"^(save|data)\b(?! *[=%(])|^[^:]*, *save\b[^:]*::", "^$", "no save, no data: state lives in arguments"),
     (r"^[^:]*, *pointer\b[^:]*::", "^src/platform/", "no pointers: use allocatables and integer links"),
+    (r"(?<!\w)settings(%\w+(\([^()]*\))?)+ *=(?![=>])|\btype *\( *settings_t *\) *, *intent *\( *(in)?out *\)",
+     "^src/config/", "settings do not change once they are read"),
     (r"\bgo *to\b", "^$", "go to is not used here"),
     (r"%(law|damping|friction) *(==|/=)", "/law_factory.f90$",
      "only `choose_parts` of law_factory.f90 knows these words"),

@@ -94,6 +94,7 @@ BAD = [
     (BY, "      type(length_t)", 30, "no comment !> above by"),
     (BY, "      type(baby_t)", 30, "no comment !> above by"),
     (LONGER, "      stop 1\n", 33, "only the program"),
+    (LONGER, "      self%settings%forces%gravity(1) = 0.0_wp\n", 33, "settings do not change"),
     (LONGER, "      if (by > 0) error stop 'no'\n", 33, "only the program"),
     (LONGER, "      if (by > 0) call abort()\n", 33, "only the program"),
     (LONGER, "      call omp_set_num_threads(2)\n", 33, "set the threads"),

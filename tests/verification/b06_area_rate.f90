@@ -40,12 +40,12 @@ contains
          call press(pair)
          ! A corner that enters within h changes the area by h^2 only, unless the overlap itself is that small.
          if (pair%contacts%n == 0_ip .or. pair%contacts%n_degenerate > 0_ip) cycle
-         if (pair%contacts%area(1) < 1.0e-6_wp) cycle
+         if (pair%contacts%row(1)%area < 1.0e-6_wp) cycle
          n = n + 1
-         rate = pair%contacts%rate(1)
+         rate = pair%contacts%row(1)%rate
          associate (bodies => pair%bodies)
-            scale = norm2(pair%contacts%normal(:, 1))*(norm2(bodies%velocity(:, 1)) + norm2(bodies%velocity(:, 2))) &
-               + sum(abs(pair%contacts%moment(:, 1)*bodies%angular_velocity))
+            scale = norm2(pair%contacts%row(1)%normal)*(norm2(bodies%velocity(:, 1)) + norm2(bodies%velocity(:, 2))) &
+               + sum(abs(pair%contacts%row(1)%moment*bodies%angular_velocity))
          end associate
          call move(h, pair, after)
          call move(-2.0_wp*h, pair, before)
@@ -64,7 +64,7 @@ contains
       pair%bodies%angle = pair%bodies%angle + time*pair%bodies%angular_velocity
       call press(pair)
       area = 0.0_wp
-      if (pair%contacts%n > 0_ip) area = pair%contacts%area(1)
+      if (pair%contacts%n > 0_ip) area = pair%contacts%row(1)%area
    end subroutine move
 
    !> Corners on an ellipse around a point near (x, 0).

@@ -154,12 +154,12 @@ contains
       worst = 0.0_wp
       associate (contacts => simulation%contacts)
          do c = 1, contacts%n
-            depth = contacts%area(c)/width
+            depth = contacts%row(c)%area/width
             worst = max(worst, abs(depth/(weight*above(c)/(young*width)*(width - depth)) - 1.0_wp))
          end do
          call table%expect_absolute(friction//': number of contacts', real(n, wp), real(contacts%n, wp), 0.0_wp)
          call table%expect_relative(friction//': depth of the lowest interface [m]', depth_below(n, young), &
-                                    contacts%area(2)/width, 1.0e-6_wp)
+                                    contacts%row(2)%area/width, 1.0e-6_wp)
          call table%expect_absolute(friction//': worst relative error of a depth', 0.0_wp, worst, 1.0e-6_wp)
       end associate
       call table%expect_absolute(friction//': greatest speed [m/s]', 0.0_wp, &
@@ -176,10 +176,10 @@ contains
          integer, intent(in) :: c
 
          associate (contacts => simulation%contacts)
-            if (simulation%bodies%fixed(contacts%second(c))) then
+            if (simulation%bodies%fixed(contacts%row(c)%second)) then
                above = real(n, wp)
             else
-               above = real(n - contacts%first(c), wp)
+               above = real(n - contacts%row(c)%first, wp)
             end if
          end associate
       end function above

@@ -216,8 +216,8 @@ contains
                (bodies%velocity(1, s) - rate*(bodies%position(2, s) - 0.5_wp*side))
          end do
          do c = 1_ip, cell%contacts%n
-            branch = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, cell%contacts%second(c)) &
-                                  - bodies%position(:, cell%contacts%first(c)))
+            branch = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, cell%contacts%row(c)%second) &
+                                  - bodies%position(:, cell%contacts%row(c)%first))
             force = contact_force(cell%contacts, c)
             sum_xy = sum_xy + branch(2)*force(1)
          end do

@@ -199,7 +199,7 @@ contains
    real(wp) function top_of(simulation)
       type(simulation_t), intent(in) :: simulation
 
-      associate (wall => simulation%walls%named%wall(4))
+      associate (wall => simulation%walls%wall(4))
          top_of = simulation%bodies%position(2, wall%slots(1)) - 0.02_wp
       end associate
    end function top_of
@@ -210,10 +210,10 @@ contains
       integer :: c
 
       force_of_top = 0.0_wp
-      associate (contacts => simulation%contacts, slot => simulation%walls%named%wall(4)%slots(1))
+      associate (contacts => simulation%contacts, slot => simulation%walls%wall(4)%slots(1))
          do c = 1, int(contacts%n)
-            if (contacts%first(c) == slot) force_of_top = force_of_top + force_along(c)
-            if (contacts%second(c) == slot) force_of_top = force_of_top - force_along(c)
+            if (contacts%row(c)%first == slot) force_of_top = force_of_top + force_along(c)
+            if (contacts%row(c)%second == slot) force_of_top = force_of_top - force_along(c)
          end do
       end associate
 

@@ -62,7 +62,7 @@ contains
       do k = 1, 2000
          if (.not. allocated(error)) call advance(simulation, error)
          depth = 0.0_wp
-         if (simulation%contacts%n > 0) depth = simulation%contacts%area(1)/width
+         if (simulation%contacts%n > 0) depth = simulation%contacts%row(1)%area/width
          if (depth > 0.0_wp) touched = touched + simulation%dt
          deepest = max(deepest, depth)
       end do

@@ -41,7 +41,7 @@ contains
       simulation%bodies%acceleration = 0.0_wp
       n = max(1, nint(rise/simulation%dt))
       do k = 1, n + nint(hold/simulation%dt)
-         simulation%settings%forces%gravity = gravity*sin(0.5_wp*pi*real(min(k, n), wp)/real(n, wp))**2
+         simulation%forces%gravity = gravity*sin(0.5_wp*pi*real(min(k, n), wp)/real(n, wp))**2
          call advance(simulation, error)
          if (allocated(error)) return
          moved = norm2(simulation%bodies%position(:, body) - start)

@@ -6,13 +6,13 @@ module trial
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_motion, only: motion_item_t, motion_t
+   use polydem_motion, only: motion_t
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: compute_balance, simulation_t
    use polydem_start, only: new_simulation
    use polydem_time_step, only: advance
-   use polydem_wall, only: new_wall, wall_t
+   use polydem_walls, only: walls_t
    implicit none
    private
    public :: begin, begin_scene, steps, find_missing_energy, block_at
@@ -38,8 +38,7 @@ contains
       integer(ip), intent(in), optional :: moved(:)
       type(settings_t) :: settings
       type(bodies_t) :: bodies
-      type(wall_t), allocatable :: walls(:)
-      type(motion_item_t) :: items(1)
+      type(walls_t) :: walls
       character(len=1) :: no_overrides(0)
 
       call read_settings_text('trial.nml', "&scene name = 'file' bodies_file = 'none' /"//new_line('a')//text, &
@@ -47,12 +46,12 @@ contains
       if (allocated(error)) return
       call new_bodies(list, bodies, error)
       if (allocated(error)) return
-      allocate (walls(merge(1, 0, present(motion))))
+      allocate (walls%wall(0), walls%motions(merge(1, 0, present(motion))))
       if (present(motion)) then
-         allocate (items(1)%motion, source=motion)
-         call new_wall(walls(1), items, bodies, moved)
+         allocate (walls%motions(1)%motion, source=motion)
+         call walls%append(bodies, bodies%id(moved), [1], [integer ::])
       end if
-      call start_simulation(settings, bodies, walls, simulation, error)
+      call start_simulation(settings, bodies, simulation, error, walls)
    end subroutine begin
 
    !> Create the simulation of a whole namelist.

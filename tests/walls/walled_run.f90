@@ -70,8 +70,8 @@ contains
       call collect_row(simulation)
       column = huge(column)
       associate (row => simulation%series%row)
-         do k = 1_ip, size(row%name, kind=ip)
-            if (row%name(k) == name) column = real(row%value(k), wp)
+         do k = 1_ip, size(row%label, kind=ip)
+            if (row%label(k)%name == name) column = real(row%value(k), wp)
          end do
       end associate
    end function column

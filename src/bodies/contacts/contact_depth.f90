@@ -24,9 +24,9 @@ contains
 
       do c = 1_ip, contacts%n
          if (bodies%pieces%most == 1_ip) then
-            thinner(c) = min(bodies%thickness(contacts%first(c)), bodies%thickness(contacts%second(c)))
+            thinner(c) = min(bodies%thickness(contacts%row(c)%first), bodies%thickness(contacts%row(c)%second))
          else
-            associate (pair => contacts%pair(c), thickness => bodies%pieces%thickness)
+            associate (pair => contacts%row(c)%pair, thickness => bodies%pieces%thickness)
                thinner(c) = min(thickness(first(pair)), thickness(second(pair)))
             end associate
          end if
@@ -41,7 +41,7 @@ contains
       !> Index of the contact
       integer(ip), intent(in) :: c
 
-      depth_share = contacts%depth(c)/thinner(c)
+      depth_share = contacts%row(c)%depth/thinner(c)
    end function depth_share
 
    !> The contact with the greatest share, 0 if there are no contacts
@@ -77,7 +77,7 @@ contains
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(contacts, thinner, limit) private(c) reduction(.or.:deeper)
       do c = 1_ip, contacts%n
-         deeper = deeper .or. contacts%depth(c) > limit*thinner(c)
+         deeper = deeper .or. contacts%row(c)%depth > limit*thinner(c)
       end do
       !$omp end parallel do
       any_deeper = deeper
@@ -93,11 +93,11 @@ contains
       integer(ip), intent(in) :: c
       character(len=:), allocatable :: text
 
-      associate (i => contacts%first(c), j => contacts%second(c))
+      associate (i => contacts%row(c)%first, j => contacts%row(c)%second)
          text = 'the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
-            to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
-            to_text(bodies%position(2, i) + contacts%arm_first(2, c))//') m overlap by '// &
-            to_text(contacts%depth(c), 3)//' m, '// &
+            to_text(bodies%position(1, i) + contacts%row(c)%arm_first(1))//', '// &
+            to_text(bodies%position(2, i) + contacts%row(c)%arm_first(2))//') m overlap by '// &
+            to_text(contacts%row(c)%depth, 3)//' m, '// &
             to_text(depth_share(contacts, thinner, c), 3)//' of the thinner body'
       end associate
    end function depth_text

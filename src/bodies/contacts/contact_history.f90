@@ -4,16 +4,13 @@
 !> to zero when the polygons separate. Force parts and guards declare the columns that they need; there are no others.
 module polydem_contact_history
    use polydem_kinds, only: ip, wp
+   use polydem_label, only: label_t
    implicit none
    private
    public :: contact_history_t, history_kind_t, add_column, column_of
 
-   !> Description of a column of the contact history
-   type :: history_kind_t
-      !> Name in checkpoints, and unit
-      character(len=16) :: name, unit
-      !> Meaning of the values
-      character(len=48) :: meaning
+   !> Description of a column of the contact history; its name is that in checkpoints
+   type, extends(label_t) :: history_kind_t
       !> Whether zero marks a new contact. A scheme that does not use the forces at time 0 clears such a column after it
       !> has computed them
       logical :: zero_is_new = .false.

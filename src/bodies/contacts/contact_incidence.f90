@@ -33,14 +33,14 @@ contains
          start_1 = 0_ip
          start_2 = 0_ip
          do c = 1_ip, contacts%n
-            start_1(contacts%first(c)) = start_1(contacts%first(c)) + 1_ip
-            start_2(contacts%second(c)) = start_2(contacts%second(c)) + 1_ip
+            start_1(contacts%row(c)%first) = start_1(contacts%row(c)%first) + 1_ip
+            start_2(contacts%row(c)%second) = start_2(contacts%row(c)%second) + 1_ip
          end do
          call counts_to_ends(n_bodies, start_1)
          call counts_to_ends(n_bodies, start_2)
          do c = contacts%n, 1_ip, -1_ip
-            s = contacts%second(c)
-            start_1(contacts%first(c)) = start_1(contacts%first(c)) - 1_ip
+            s = contacts%row(c)%second
+            start_1(contacts%row(c)%first) = start_1(contacts%row(c)%first) - 1_ip
             start_2(s) = start_2(s) - 1_ip
             incidence%contact(start_2(s)) = c
          end do

@@ -1,7 +1,7 @@
 !> Where the force of a contact acts.
 !>
 !> The law states a force at the centroid of the overlap, and a torque besides: the normal force times `lever`, that of
-!> cohesion, and `twist`. A normal force at another point of the line through the centroid, along the contact, has this
+!> cohesion, and `couple`. A normal force at another point of the line through the centroid, along the contact, has this
 !> torque alone. The tangential force acts along this line, so its moment is the same at each of its points. The point
 !> lies within both bodies. What torque is left, as where attraction and repulsion nearly cancel, is a couple.
 module polydem_contact_resultant
@@ -29,18 +29,18 @@ contains
       real(wp) :: along(2), line(2), place, across
 
       shift = 0.0_wp
-      across = contacts%normal_force(c)
-      couple = across*contacts%lever(c)
+      across = contacts%row(c)%normal_force
+      couple = across*contacts%row(c)%lever
       if (contacts%has_cohesion) then
-         across = across + inner_product(contacts%cohesion(:2, c), contacts%direction(:, c))
-         couple = couple + contacts%cohesion(3, c)
+         across = across + inner_product(contacts%row(c)%cohesion(:2), contacts%row(c)%direction)
+         couple = couple + contacts%row(c)%cohesion(3)
       end if
-      if (contacts%has_twist) couple = couple + contacts%twist(c)
+      if (contacts%has_couple) couple = couple + contacts%row(c)%couple
       if (.not. abs(couple) > 0.0_wp .or. .not. abs(across) > 0.0_wp) return
-      along = [-contacts%direction(2, c), contacts%direction(1, c)]
+      along = [-contacts%row(c)%direction(2), contacts%row(c)%direction(1)]
       line = [-huge(1.0_wp), huge(1.0_wp)]
-      call shorten(bodies, contacts%first(c), contacts%arm_first(:, c), along, line)
-      call shorten(bodies, contacts%second(c), contacts%arm_second(:, c), along, line)
+      call shorten(bodies, contacts%row(c)%first, contacts%row(c)%arm_first, along, line)
+      call shorten(bodies, contacts%row(c)%second, contacts%row(c)%arm_second, along, line)
       place = -couple/across
       if (place >= line(1) .and. place <= line(2)) then
          couple = 0.0_wp

@@ -3,7 +3,7 @@
 !> Threads run over ranges of pairs in descending order. The table is in ascending order.
 module polydem_contact_rows
    use polydem_contact_block, only: contact_block_t, store_contact, store_forces
-   use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, reserve_contacts
+   use polydem_contacts, only: contacts_t, grow_contacts, reserve_contacts
    use polydem_kinds, only: ip, min_parallel_size
    use polydem_pair_ranges, only: most_ranges
    implicit none
@@ -18,16 +18,13 @@ module polydem_contact_rows
 
 contains
 
-   !> Empty the rows. They get the same columns as a table.
-   pure subroutine start_rows(contacts, expected, rows)
-      type(contacts_t), intent(in) :: contacts
+   !> Empty the rows.
+   pure subroutine start_rows(expected, rows)
       !> Number of contacts to make room for; more may follow
       integer(ip), intent(in) :: expected
       type(contact_rows_t), intent(inout) :: rows
 
       rows%contacts%n = 0_ip
-      rows%contacts%has_cohesion = contacts%has_cohesion
-      rows%contacts%has_twist = contacts%has_twist
       if (expected > 0_ip) call reserve_contacts(rows%contacts, expected)
    end subroutine start_rows
 
@@ -48,8 +45,8 @@ contains
                if (.not. chosen(b)) cycle
             end if
             table%n = table%n + 1_ip
-            call store_contact(block, b, table, table%n)
-            if (with_forces) call store_forces(block, b, table, table%n)
+            call store_contact(block, b, table%row(table%n))
+            if (with_forces) call store_forces(block, b, table%row(table%n))
          end do
       end associate
    end subroutine append_rows
@@ -74,7 +71,7 @@ contains
       !$omp    shared(rows, contacts, base) private(r, c)
       do r = 1, size(rows)
          do c = 1_ip, rows(r)%contacts%n
-            call copy_contact(rows(r)%contacts, c, contacts, base(r) + 1_ip - c)
+            contacts%row(base(r) + 1_ip - c) = rows(r)%contacts%row(c)
          end do
       end do
       !$omp end parallel do

@@ -1,15 +1,17 @@
 !> Terms of the contacts between fixed and free bodies, for the energy balance and for forces on walls.
 module polydem_wall_terms
    use polydem_bodies, only: bodies_t
+   use polydem_bodies_in_cell, only: path_of
    use polydem_cell, only: copies_along_y
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
-   use polydem_force_sums, only: contact_terms_t, term_of, terms_of_block
+   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contacts, only: contacts_t, load_block
+   use polydem_force_sums, only: contact_terms_t, n_terms, of_normal, of_tangential, sum_torque, sum_x, sum_y, &
+      term_of, terms_of_block
    use polydem_kinds, only: ip, wp
    use polydem_term_list, only: append_term, reserve_terms, term_list_t
    implicit none
    private
-   public :: wall_terms_t, append_walls, append_border, join_walls, select_walls
+   public :: wall_terms_t, append_walls, append_border, join_walls, select_walls, force_about
 
    !> Terms of the fixed bodies of contacts, in descending order of the contacts. The partners are the free bodies
    type, extends(term_list_t) :: wall_terms_t
@@ -116,6 +118,25 @@ contains
          all_of_them%n = all_of_them%n + n
       end associate
    end subroutine append_list
+
+   !> Force of a contact on a fixed body along x and y [N/m], and its torque about a point [N]. The body is on its path
+   !> through the copies of a periodic cell.
+   pure function force_about(point, bodies, s, term) result(force)
+      !> The point, (2) [m]
+      real(wp), intent(in) :: point(2)
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the fixed body
+      integer(ip), intent(in) :: s
+      !> Its term in the contact
+      real(wp), intent(in) :: term(n_terms)
+      real(wp) :: force(3), arm(2)
+
+      arm = path_of(bodies, s) - point
+      force(1) = term(sum_x(of_normal)) + term(sum_x(of_tangential))
+      force(2) = term(sum_y(of_normal)) + term(sum_y(of_tangential))
+      force(3) = (arm(1)*force(2) - arm(2)*force(1)) &
+                 + (term(sum_torque(of_normal)) + term(sum_torque(of_tangential)))
+   end function force_about
 
    !> Select the contacts with fixed bodies from a table.
    subroutine select_walls(bodies, contacts, walls)

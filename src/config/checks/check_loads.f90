@@ -1,15 +1,15 @@
-!> Checks of the groups &load against each other and against motions.
+!> Checks of the groups &load against each other.
 module polydem_check_loads
    use polydem_blame_entry, only: blame
    use polydem_errors, only: error_t
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: wp
-   use polydem_settings, only: load_settings_t, motion_settings_t, settings_t
+   use polydem_settings, only: load_settings_t, settings_t
    implicit none
    private
-   public :: check_loads
+   public :: check_loads, act_together, one_of_them
 
-   !> Remedy for a direction in which a wall moves already
+   !> Remedy for a direction in which a wall moves already, behind what moves it
    character(len=*), parameter :: one_of_them = ' at the same time; leave out one of them, or let one begin at the '// &
       '''end'' of the other'
 
@@ -104,7 +104,8 @@ contains
                  'out, or change ''gravity'' in &forces', error)
    end subroutine check_weight
 
-   !> Check that nothing else moves the wall along the direction of a load.
+   !> Check that no load before it moves the wall along the direction of a load. The motions of the wall are checked
+   !> when they are made (`polydem_assign_walls`).
    pure subroutine check_direction(settings, l, instance, error)
       type(settings_t), intent(in) :: settings
       !> Number of the load
@@ -113,60 +114,26 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      associate (load => settings%load(l))
-         do k = 1, l - 1
-            associate (other => settings%load(k))
-               if (are_in_different_stages(load%stage, other%stage)) cycle
-               if (other%wall == load%wall .and. other%direction == load%direction .and. &
-                   meet(load%start, load%end, other%start, other%end)) call blame(instance, 'direction', &
-                  'is that of the load '//other%name//' of the same wall'//one_of_them, error)
-            end associate
-         end do
-         do k = 1, size(settings%motion)
-            associate (motion => settings%motion(k))
-               if (motion%wall /= load%wall .and. (motion%wall /= '' .or. size(motion%bodies) > 0)) cycle
-               if (are_in_different_stages(load%stage, motion%stage)) cycle
-               ! The end of such a motion is an error of its own.
-               if (motion%end > 0.0_wp .and. motion%end <= motion%start) cycle
-               if (.not. meet(load%start, load%end, motion%start, motion%end)) cycle
-               if (moves_along(load%direction, motion)) call blame(instance, 'direction', 'is one in which the '// &
-                  'motion '//motion%name//' moves the same wall'//one_of_them, error)
-            end associate
-         end do
-      end associate
+      do k = 1, l - 1
+         associate (load => settings%load(l), other => settings%load(k))
+            if (other%wall /= load%wall .or. other%direction /= load%direction) cycle
+            if (act_together([load%start, load%end], load%stage, [other%start, other%end], other%stage)) &
+               call blame(instance, 'direction', 'is that of the load '//other%name//' of the same wall'// &
+                          one_of_them, error)
+         end associate
+      end do
    end subroutine check_direction
 
-   !> Whether a motion moves bodies along a direction
-   pure logical function moves_along(direction, motion)
-      character(len=*), intent(in) :: direction
-      type(motion_settings_t), intent(in) :: motion
-      real(wp) :: along(2)
+   !> Whether two loads, or a load and a motion, act at the same time
+   pure logical function act_together(times, stage, other_times, other_stage)
+      !> Start and end of both; an end of 0 is none
+      real(wp), intent(in) :: times(2), other_times(2)
+      !> Names of their stages, empty without one
+      character(len=*), intent(in) :: stage, other_stage
 
-      along = motion%amplitude
-      if (motion%kind /= 'conveyor') along = along + motion%velocity
-      select case (direction)
-      case ('x')
-         moves_along = abs(along(1)) > 0.0_wp
-      case ('y')
-         moves_along = abs(along(2)) > 0.0_wp
-      case default
-         moves_along = abs(motion%rate) > 0.0_wp
-      end select
-   end function moves_along
-
-   !> Whether two loads or motions act in stages that differ
-   pure logical function are_in_different_stages(stage, other)
-      !> Names of the stages, empty without one
-      character(len=*), intent(in) :: stage, other
-
-      are_in_different_stages = stage /= '' .and. other /= '' .and. stage /= other
-   end function are_in_different_stages
-
-   !> Whether two intervals of time have a common part; an end of 0 is none
-   pure logical function meet(start, end, other_start, other_end)
-      real(wp), intent(in) :: start, end, other_start, other_end
-
-      meet = (.not. other_end > 0.0_wp .or. start < other_end) .and. (.not. end > 0.0_wp .or. other_start < end)
-   end function meet
+      act_together = (.not. other_times(2) > 0.0_wp .or. times(1) < other_times(2)) .and. &
+                     (.not. times(2) > 0.0_wp .or. other_times(1) < times(2))
+      if (stage /= '' .and. other_stage /= '') act_together = act_together .and. stage == other_stage
+   end function act_together
 
 end module polydem_check_loads

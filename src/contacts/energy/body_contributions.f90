@@ -166,15 +166,15 @@ contains
       real(wp), intent(inout) :: channels(n_channels)
       !> Wall channels of the free body
       real(wp), intent(inout) :: wall_channels(n_wall_channels)
-      real(wp) :: fx, fy, twist, torque
+      real(wp) :: fx, fy, couple, torque
 
       call add_term(bodies%velocity(:, wall), bodies%angular_velocity(wall), term, weight, channels)
       fx = term(sum_x(of_normal)) + term(sum_x(of_tangential))
       fy = term(sum_y(of_normal)) + term(sum_y(of_tangential))
-      twist = term(sum_torque(of_normal)) + term(sum_torque(of_tangential))
+      couple = term(sum_torque(of_normal)) + term(sum_torque(of_tangential))
       associate (x => bodies%position(:, wall), v => bodies%velocity(:, wall), w => bodies%angular_velocity(wall))
-         torque = (x(1)*fy - x(2)*fx) + twist
-         wall_channels(1) = wall_channels(1) - weight*((fx*v(1) + fy*v(2)) + twist*w)
+         torque = (x(1)*fy - x(2)*fx) + couple
+         wall_channels(1) = wall_channels(1) - weight*((fx*v(1) + fy*v(2)) + couple*w)
       end associate
       wall_channels(2) = wall_channels(2) - weight*fx
       wall_channels(3) = wall_channels(3) - weight*fy
@@ -265,7 +265,7 @@ contains
          if (allocated(bodies%image)) values(2) = values(2) &
             - m*(gravity(1)*(real(bodies%image(s, 1), wp)*bodies%cell%size(1)) &
                  + gravity(2)*(real(bodies%image(s, 2), wp)*bodies%cell%size(2)))
-         if (allocated(bodies%slid)) values(2) = values(2) - m*(gravity(1)*bodies%slid(s))
+         if (allocated(bodies%shear_offset)) values(2) = values(2) - m*(gravity(1)*bodies%shear_offset(s))
          values(3:4) = m*v
          values(5) = m*(x(1)*v(2) - x(2)*v(1)) + spin
          values(6) = m*(abs(v(1)) + abs(v(2)))

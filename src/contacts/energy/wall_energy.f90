@@ -1,4 +1,4 @@
-!> Energy of walls in the balance: of those that are load-controlled, and of those that vanish; and work of a
+!> Energy of walls in the balance: of those that are load-controlled, and of those that are removed; and work of a
 !> stress-controlled cell.
 module polydem_wall_energy
    use polydem_energy_balance, only: balance_t, energy_balance_t

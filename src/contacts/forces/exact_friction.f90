@@ -136,7 +136,7 @@ contains
       coefficients = self%coefficient%one
       if (allocated(self%coefficient%factor)) then
          do c = 1_ip, contacts%n
-            coefficients(c) = self%coefficient%of(bodies%material([contacts%first(c), contacts%second(c)]))
+            coefficients(c) = self%coefficient%of(bodies%material([contacts%row(c)%first, contacts%row(c)%second]))
          end do
       end if
       associate (network => self%network, programme => self%programme)
@@ -145,12 +145,12 @@ contains
          call free_velocities(dt, bodies, programme%free)
          programme%tolerance = self%tolerance
          do c = 1_ip, contacts%n
-            programme%force(c) = within(network%limit(c), history%column(self%first_column)%value(contacts%pair(c)))
+            programme%force(c) = within(network%limit(c), history%column(self%first_column)%value(contacts%row(c)%pair))
          end do
          call solve_box_qp(programme, network, incidence, solved)
          do c = 1_ip, contacts%n
-            contacts%tangential_force(c) = contacts%tangential_force(c) + programme%force(c)
-            history%column(self%first_column)%value(contacts%pair(c)) = programme%force(c)
+            contacts%row(c)%tangential_force = contacts%row(c)%tangential_force + programme%force(c)
+            history%column(self%first_column)%value(contacts%row(c)%pair) = programme%force(c)
          end do
          if (contacts%n > 0_ip) self%n_solved = self%n_solved + 1_lp
          self%greatest_residual = max(self%greatest_residual, programme%residual)

@@ -40,8 +40,8 @@ module polydem_force_law
       type(overlap_measure_t) :: overlap_measure
       !> Whether a part adds to the column `cohesion`
       logical :: needs_cohesion = .false.
-      !> Whether a part adds to the column `twist`
-      logical :: needs_twist = .false.
+      !> Whether a part adds to the column `couple`
+      logical :: needs_couple = .false.
       !> Whether a part needs the shares of contacts between the same two bodies
       logical :: needs_shares = .false.
       !> Whether a part needs the accelerations of the last step
@@ -128,7 +128,7 @@ contains
                law%needs_shares = law%needs_shares .or. part%overlap_measure%per_length
             end if
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
-            law%needs_twist = law%needs_twist .or. part%needs_twist
+            law%needs_couple = law%needs_couple .or. part%needs_couple
             law%needs_shares = law%needs_shares .or. part%needs_shares
             law%needs_accelerations = law%needs_accelerations .or. part%needs_accelerations
             law%energy_is_known = law%energy_is_known .or. part%energy_is_known
@@ -215,7 +215,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
-      !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `twist` are set
+      !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `couple` are set
       type(contact_block_t), intent(inout) :: block
       !> Contact history; only the pairs of these contacts change
       type(contact_history_t), intent(inout) :: history
@@ -227,8 +227,8 @@ contains
          if (law%needs_cohesion) block%cohesion(:n, :) = 0.0_wp
          block%normal_force(:n) = 0.0_wp
          block%tangential_force(:n) = 0.0_wp
-         block%twist(:n) = 0.0_wp
-         if (law%needs_twist) block%dashpot(:n) = 0.0_wp
+         block%couple(:n) = 0.0_wp
+         if (law%needs_couple) block%dashpot(:n) = 0.0_wp
       end associate
       do k = 1, size(law%parts)
          call law%parts(k)%part%add(bodies, dt, block, history)

@@ -6,7 +6,7 @@
 !> * `elastic` and `normal_force`: repulsion of the overlap, work of elastic forces;
 !> * `cohesion`: another force with a potential, which may attract, also work of elastic forces;
 !> * `normal_force` alone: work of damping;
-!> * `twist`: torque of the contact itself, work of damping;
+!> * `couple`: torque of the contact itself, work of damping;
 !> * `tangential_force`: work of tangential forces.
 !>
 !> The order in which parts are listed does not matter; they act in the order of their stages. A part is immutable once
@@ -62,8 +62,8 @@ module polydem_force_part
       type(softness_fit_t) :: fit
       !> Whether it adds to the column `cohesion`, and whether it states the energy there
       logical :: needs_cohesion = .false., cohesion_has_energy = .false.
-      !> Whether it adds to the column `twist`
-      logical :: needs_twist = .false.
+      !> Whether it adds to the column `couple`
+      logical :: needs_couple = .false.
       !> Whether it needs the shares of contacts between the same two bodies
       logical :: needs_shares = .false.
       !> Column of the contact history with the force of friction of the last step; 0 if there is none

@@ -89,7 +89,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
 
-      call choose_parts(settings%forces, law, pair_parameters(settings))
+      call choose_parts(settings%forces, law, pair_parameters(settings, settings%forces))
       call law%check(settings, n_processes, error)
    end subroutine check_law
 

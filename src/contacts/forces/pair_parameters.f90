@@ -24,9 +24,11 @@ module polydem_pair_parameters
 contains
 
    !> Parameters of the contacts of a run
-   pure type(pair_parameters_t) function pair_parameters(settings) result(pairs)
-      !> Settings: groups &forces, &material and &contact_pair
+   pure type(pair_parameters_t) function pair_parameters(settings, forces) result(pairs)
+      !> Settings: groups &material and &contact_pair
       type(settings_t), intent(in) :: settings
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: forces
       real(wp), allocatable :: values(:, :), table(:, :, :)
       integer(ip) :: i, j, k, n
 
@@ -34,7 +36,7 @@ contains
       if (allocated(settings%material)) n = size(settings%material, kind=ip)
       allocate (values(n_pair_entries, 0:n), table(0:n, 0:n, n_pair_entries))
       do i = 0_ip, n
-         values(:, i) = common_values(settings%forces)
+         values(:, i) = common_values(forces)
          if (i > 0_ip) call take_material(settings%material(i), values(:, i))
       end do
       do j = 0_ip, n
@@ -52,7 +54,7 @@ contains
             end associate
          end do
       end if
-      call set_parameters(pairs, with_tangential(table), common_factors(settings%forces))
+      call set_parameters(pairs, with_tangential(table), common_factors(forces))
    end function pair_parameters
 
    !> Parameters of contacts between bodies without materials

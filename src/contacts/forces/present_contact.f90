@@ -1,7 +1,7 @@
 !> The springs and dashpots of a contact of the table, and the mobilities of its two bodies at the contact point.
 module polydem_present_contact
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contacts_t
+   use polydem_contact_block, only: contact_t
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, wp
    use polydem_linearised_contact, only: linearised_contact_t
@@ -11,14 +11,12 @@ module polydem_present_contact
 
 contains
 
-   !> Describe contact c.
-   subroutine describe_contact(law, bodies, contacts, c, element, mobility, lever)
+   !> Describe a contact.
+   subroutine describe_contact(law, bodies, contact, element, mobility, lever)
       type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces
-      type(contacts_t), intent(in) :: contacts
-      !> Its index
-      integer(ip), intent(in) :: c
+      !> The contact with its forces
+      type(contact_t), intent(in) :: contact
       !> Its springs and dashpots
       type(linearised_contact_t), intent(out) :: element
       !> Mobilities of the first and the second body: normal, tangential, mixed [m/kg], rotational [1/(kg m)]; 0 of a
@@ -31,17 +29,17 @@ contains
       mobility = 0.0_wp
       lever = 0.0_wp
       rolling = 0.0_wp
-      call add_body(contacts%first(c), contacts%arm_first(:, c), 1)
-      call add_body(contacts%second(c), contacts%arm_second(:, c), 2)
+      call add_body(contact%first, contact%arm_first, 1)
+      call add_body(contact%second, contact%arm_second, 2)
       alone = mobility(:, 1) + mobility(:, 2)
-      if (allocated(bodies%material)) element%materials = bodies%material([contacts%first(c), contacts%second(c)])
-      element%area = contacts%area(c)
-      element%length = contacts%length(c)
-      element%inverse_length = contacts%inverse_length(c)
+      if (allocated(bodies%material)) element%materials = bodies%material([contact%first, contact%second])
+      element%area = contact%area
+      element%length = contact%length
+      element%inverse_length = contact%inverse_length
       element%ratio = element%length*element%inverse_length
-      element%elastic = contacts%elastic(c)
-      element%repulsion = contacts%normal_force(c)
-      element%normal_mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
+      element%elastic = contact%elastic
+      element%repulsion = contact%normal_force
+      element%normal_mobility = bodies%inverse_mass(contact%first) + bodies%inverse_mass(contact%second)
       element%normal_mass = 1.0_wp/element%normal_mobility
       element%inverse_square = alone(4)/(6.0_wp*element%normal_mobility)
       element%tangential_mass = 1.0_wp/alone(2)
@@ -61,8 +59,8 @@ contains
          real(wp) :: along, across
 
          if (bodies%fixed(s)) return
-         across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c) + contacts%lever(c)
-         along = arm(1)*contacts%direction(1, c) + arm(2)*contacts%direction(2, c)
+         across = arm(1)*contact%direction(2) - arm(2)*contact%direction(1) + contact%lever
+         along = arm(1)*contact%direction(1) + arm(2)*contact%direction(2)
          lever(:, k) = [across, along]
          mobility(:2, k) = bodies%inverse_mass(s) + [across*across, along*along]*bodies%inverse_inertia(s)
          mobility(3:, k) = [along*across, 1.0_wp]*bodies%inverse_inertia(s)

@@ -13,7 +13,7 @@
 !> part of the contact history. (Ai et al. omit it where the spring is at its limit, which differs little.)
 !>
 !> w is that in the middle of the step, so that the couple follows the angles: it is of second order in dt. Its work
-!> counts as damping, as that of every `twist`; the spring gives back what it has stored.
+!> counts as damping, as that of every `couple`; the spring gives back what it has stored.
 module polydem_rolling_resistance
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
@@ -64,7 +64,7 @@ contains
       type(pair_parameters_t), intent(in) :: pairs
 
       self%stage = stage_last
-      self%needs_twist = .true.
+      self%needs_couple = .true.
       self%needs_accelerations = .true.
       self%logged = [at_rolling_friction]
       self%coefficient = pairs%rolling_friction
@@ -113,7 +113,7 @@ contains
       class(rolling_resistance_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
-      !> Contacts with complete normal forces; `twist` changes
+      !> Contacts with complete normal forces; `couple` changes
       type(contact_block_t), intent(inout) :: block
       !> Contact history; the couple of the spring is read and set
       type(contact_history_t), intent(inout) :: history
@@ -155,7 +155,7 @@ contains
             couple = max(-limit(c), min(limit(c), stored(p) - stiffness(c)*middle*dt))
             stored(p) = couple
             dashpot = 2.0_wp*self%damping*sqrt(stiffness(c)/(self%inverse_inertia(i) + self%inverse_inertia(j)))
-            block%twist(c) = block%twist(c) + max(-limit(c), min(limit(c), couple - dashpot*rate))
+            block%couple(c) = block%couple(c) + max(-limit(c), min(limit(c), couple - dashpot*rate))
          end associate
       end do
    end subroutine turn

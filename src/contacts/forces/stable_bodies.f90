@@ -53,8 +53,8 @@ contains
       n = size(bodies%free, kind=ip)
       allocate (steps(n), extra(contacts%n))
       extra = 0.0_wp
-      if (present(wall_mobility)) extra = max(wall_mobility(contacts%first(:contacts%n)), &
-                                              wall_mobility(contacts%second(:contacts%n)))
+      if (present(wall_mobility)) extra = max(wall_mobility(contacts%row(:contacts%n)%first), &
+                                              wall_mobility(contacts%row(:contacts%n)%second))
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, table, bodies, contacts, incidence, extra, steps, n) private(k)
       do k = 1_ip, n
@@ -135,12 +135,12 @@ contains
          type(linearised_contact_t) :: element
          real(wp) :: mobility(4, 2), lever(2, 2), factor(3)
 
-         call describe_contact(law, bodies, contacts, c, element, mobility, lever)
+         call describe_contact(law, bodies, contacts%row(c), element, mobility, lever)
          mobility(:2, other) = mobility(:2, other) + extra(c)
          factor = 1.0_wp
          where (mobility([1, 2, 4], this) > 0.0_wp) &
             factor = 1.0_wp + mobility([1, 2, 4], other)/mobility([1, 2, 4], this)
-         associate (n => contacts%direction(:, c), m => bodies%inverse_mass(s), i => bodies%inverse_inertia(s))
+         associate (n => contacts%row(c)%direction, m => bodies%inverse_mass(s), i => bodies%inverse_inertia(s))
             call add_row(springs, factor(1)*element%normal_stiffness, n, lever(1, this), m, i)
             call add_row(dashpots, factor(1)*element%normal_dashpot, n, lever(1, this), m, i)
             call add_row(springs, factor(2)*element%tangential_stiffness, [-n(2), n(1)], lever(2, this), m, i)

@@ -54,13 +54,13 @@ contains
 
       allocate (steps(contacts%n), extra(contacts%n))
       extra = 0.0_wp
-      if (present(wall_mobility)) extra = max(wall_mobility(contacts%first(:contacts%n)), &
-                                              wall_mobility(contacts%second(:contacts%n)))
+      if (present(wall_mobility)) extra = max(wall_mobility(contacts%row(:contacts%n)%first), &
+                                              wall_mobility(contacts%row(:contacts%n)%second))
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, table, bodies, numbers, contacts, steps, extra) private(c)
       do c = 1_ip, contacts%n
-         steps(c) = step_of_contact(law, table, bodies, [numbers(contacts%first(c)), numbers(contacts%second(c))], &
-                                    contacts, c, extra(c))
+         steps(c) = step_of_contact(law, table, bodies, &
+                                    numbers([contacts%row(c)%first, contacts%row(c)%second]), contacts, c, extra(c))
       end do
       !$omp end parallel do
       step = huge(step)
@@ -241,7 +241,7 @@ contains
       type(linearised_contact_t) :: element
       real(wp) :: mobility(4, 2), lever(2, 2)
 
-      call describe_contact(law, bodies, contacts, c, element, mobility, lever)
+      call describe_contact(law, bodies, contacts%row(c), element, mobility, lever)
       step_of_contact = step_of_element(table, element, ([extra, extra, 0.0_wp, 0.0_wp] &
                                                          + mobility(:, 1)*numbers(1)) + mobility(:, 2)*numbers(2))
    end function step_of_contact

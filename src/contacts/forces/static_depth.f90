@@ -27,7 +27,7 @@ contains
       type(force_law_t) :: law
       type(resting_block_t) :: loaded
 
-      call choose_parts(settings%forces, law, pair_parameters(settings))
+      call choose_parts(settings%forces, law, pair_parameters(settings, settings%forces))
       loaded = block
       loaded%load = block%load + law%pairs%cohesion%of(block%materials)*block%width
       depth = law%static_depth(loaded)

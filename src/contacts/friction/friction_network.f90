@@ -14,7 +14,8 @@
 module polydem_friction_network
    use polydem_bodies, only: bodies_t
    use polydem_contact_incidence, only: incidence_t
-   use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_contact_block, only: is_degenerate
+   use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    implicit none
    private
@@ -100,18 +101,18 @@ contains
       type(friction_network_t), intent(inout) :: network
       real(wp) :: lever(2), pressure
 
-      associate (d => contacts%direction(:, c), i => contacts%first(c), j => contacts%second(c))
+      associate (d => contacts%row(c)%direction, i => contacts%row(c)%first, j => contacts%row(c)%second)
          ! With the tangent (-d_y, d_x), arm x tangent = arm . d.
-         lever(1) = contacts%arm_first(1, c)*d(1) + contacts%arm_first(2, c)*d(2)
-         lever(2) = contacts%arm_second(1, c)*d(1) + contacts%arm_second(2, c)*d(2)
+         lever(1) = contacts%row(c)%arm_first(1)*d(1) + contacts%row(c)%arm_first(2)*d(2)
+         lever(2) = contacts%row(c)%arm_second(1)*d(1) + contacts%row(c)%arm_second(2)*d(2)
          network%body(:, c) = [i, j]
          network%row(:, c) = [-d(2), d(1), lever]
          network%mobility(c) = (network%inverse(1, i) + network%inverse(1, j)) &
             + (lever(1)**2*network%inverse(2, i) + lever(2)**2*network%inverse(2, j))
       end associate
       network%inverse_mobility(c) = 1.0_wp/network%mobility(c)
-      pressure = contacts%normal_force(c)
-      network%limit(c) = merge(0.0_wp, coefficient*max(0.0_wp, pressure), is_degenerate(contacts, c))
+      pressure = contacts%row(c)%normal_force
+      network%limit(c) = merge(0.0_wp, coefficient*max(0.0_wp, pressure), is_degenerate(contacts%row(c)))
       network%noise(c) = rounding*network%mobility(c)*abs(pressure)
    end subroutine fill_contact
 

@@ -62,6 +62,7 @@ contains
       type(contact_block_t), intent(inout) :: block
       type(place_t) :: at
 
+      block%has_cohesion = measure%with_area
       at = place_t(low, next, tested)
       if (bodies%pieces%most == 1_ip) then
          call fill(bodies, bodies%radius, bodies%pieces%vertex_start, bodies%pieces%turned, first, second, measure, &

@@ -2,10 +2,10 @@
 module polydem_find_contacts
    use omp_lib, only: omp_get_max_threads
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: contact_block_t
+   use polydem_contact_block, only: contact_block_t, is_degenerate
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_rows, only: append_rows, contact_rows_t, gather_rows, start_rows
-   use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_contacts, only: contacts_t
    use polydem_fill_block, only: fill_block
    use polydem_kinds, only: dp, ip
    use polydem_overlap_measure, only: overlap_measure_t
@@ -41,14 +41,14 @@ contains
       !$omp parallel do if (n_ranges > 1_ip) schedule(static, 1) default(none) private(r) &
       !$omp    shared(bodies, first, second, history, contacts, rows, ends, n_ranges)
       do r = 1_ip, n_ranges
-         call start_rows(contacts, 0_ip, rows(r))
+         call start_rows(0_ip, rows(r))
          call find_in_range(bodies, first, second, contacts%measure, ends(r - 1_ip:r), history, rows(r))
       end do
       !$omp end parallel do
       call gather_rows(rows(:n_ranges), contacts)
       contacts%n_degenerate = 0_ip
       do c = 1_ip, contacts%n
-         if (is_degenerate(contacts, c)) contacts%n_degenerate = contacts%n_degenerate + 1_ip
+         if (is_degenerate(contacts%row(c))) contacts%n_degenerate = contacts%n_degenerate + 1_ip
       end do
    end subroutine find_contacts
 

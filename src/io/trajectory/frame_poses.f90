@@ -54,9 +54,9 @@ contains
          call file%write('/frames/cell_size', real(bodies%cell%size, dp), error, 'm', &
                          'its width and height', rows=one_row)
       end if
-      if (.not. allocated(bodies%slid)) return
-      call blocks%to_blocks(comm, reshape(real(bodies%slid, dp), [1_ip, bodies%n]), block)
-      call file%write('/frames/slid', component(block, 1), error, 'm', &
+      if (.not. allocated(bodies%shear_offset)) return
+      call blocks%to_blocks(comm, reshape(real(bodies%shear_offset, dp), [1_ip, bodies%n]), block)
+      call file%write('/frames/shear_offset', component(block, 1), error, 'm', &
                       'shifts of the crossed borders, to be added to this path along x', part, rows=rows)
       call file%write('/frames/shift', real(bodies%cell%shift, dp), error, 'm', &
                       'displacement of the copy of the cell above along x', rows=one_row)

@@ -20,7 +20,7 @@ module polydem_frame_reader
       !> Displacement [m] and velocity [m/s] of the copy above
       real(wp) :: shift = 0.0_wp, jump = 0.0_wp
       !> Whether a checkpoint has the cells that bodies have crossed, and the shifts of the borders that they crossed
-      logical :: has_images = .false., has_slides = .false.
+      logical :: has_images = .false., has_shear_offset = .false.
       !> Greatest number of pieces of a body, in a checkpoint
       integer(ip) :: most_pieces = 1_ip
    end type surroundings_t
@@ -115,7 +115,7 @@ contains
       real(dp), allocatable :: shape(:, :), mass(:), inertia(:)
       real(wp), allocatable :: corners(:, :)
       type(frame_columns_t) :: frame
-      logical, allocatable :: is_gone(:)
+      logical, allocatable :: is_removed(:)
       real(wp) :: c, s
       integer(ip) :: j, k, v
 
@@ -137,12 +137,12 @@ contains
             ': the data sets of its segment of a trajectory are inconsistent')
       end if
       if (.not. allocated(error)) call read_frame(file, row, id, frame, error)
-      if (.not. allocated(error)) call find_gone(file, row, fixed == 1_ip, is_gone, error)
+      if (.not. allocated(error)) call find_removed(file, row, fixed == 1_ip, is_removed, error)
       call file%close(error)
       if (allocated(error)) return
       do j = 1_ip, size(frame%body, kind=ip)
          k = frame%body(j)
-         if (is_gone(k)) cycle
+         if (is_removed(k)) cycle
          call sine_and_cosine(real(frame%angle(j), wp), s, c)
          corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
          do v = 1_ip, size(corners, 2, kind=ip)
@@ -161,28 +161,28 @@ contains
       end do
    end subroutine list_frame
 
-   !> Find out which bodies belong to walls that have vanished at a frame.
-   subroutine find_gone(file, row, is_fixed, is_gone, error)
+   !> Find out which bodies belong to walls that were removed at a frame.
+   subroutine find_removed(file, row, is_fixed, is_removed, error)
       type(hdf5_file_t), intent(in) :: file
       !> Number of frames before this one in the segment
       integer(lp), intent(in) :: row
       !> Whether each body of the segment is fixed, (body)
       logical, intent(in) :: is_fixed(:)
-      !> Whether its wall has vanished, (body)
-      logical, allocatable, intent(out) :: is_gone(:)
+      !> Whether its wall was removed, (body)
+      logical, allocatable, intent(out) :: is_removed(:)
       type(error_t), allocatable, intent(inout) :: error
       real(dp), allocatable :: present_walls(:, :)
 
-      is_gone = spread(.false., 1, size(is_fixed))
+      is_removed = spread(.false., 1, size(is_fixed))
       if (.not. file%has('/walls/present', error)) return
       call file%read('/walls/present', present_walls, error, rows=[row, 1_lp])
       if (allocated(error)) return
       if (size(present_walls) /= count(is_fixed)) then
          call raise(error, input_error, '/walls/present has another number of bodies than there are fixed ones')
       else
-         is_gone = unpack(present_walls(:, 1) < 0.5_dp, is_fixed, .false.)
+         is_removed = unpack(present_walls(:, 1) < 0.5_dp, is_fixed, .false.)
       end if
-   end subroutine find_gone
+   end subroutine find_removed
 
    !> Read what a checkpoint or a frame of a segment says of the periodic cell and of pieces.
    subroutine read_surroundings(path, row, found, error)
@@ -201,7 +201,7 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       found%has_images = file%has('/bodies/image_x', error)
-      found%has_slides = file%has('/bodies/slid', error)
+      found%has_shear_offset = file%has('/bodies/shear_offset', error)
       if (file%has('/run/cell', error)) then
          call file%read('/run/cell', values, error)
       else if (file%has('/frames/cell_size', error)) then

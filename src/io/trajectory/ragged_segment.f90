@@ -4,7 +4,7 @@
 !>                  piece is there if any body of the run may have several pieces
 !>     /frames      step, time: one row per frame; start: rows start[k] to start[k + 1] - 1 belong to frame k;
 !>                  id, position, angle, velocity, angular_velocity: one row per body of each frame;
-!>                  image (in a periodic cell), slid, shift and jump (in a sheared cell)
+!>                  image (in a periodic cell), shear_offset, shift and jump (in a sheared cell)
 !>     /departures  step, time, sink, id, mass, velocity_x, velocity_y, x, y: one row per body that has left
 !>
 !> Identifiers ascend in /bodies and in each frame.

@@ -4,11 +4,11 @@
 !>                  piece (if bodies have several pieces): number of the piece of each vertex within its body, from 0
 !>     /cell        low, size: periodic cell (in a periodic cell)
 !>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
-!>                  image (in a periodic cell), slid, shift and jump (in a sheared cell), cell_low and cell_size (if the
-!>                  size of the cell is stress-controlled)
+!>                  image (in a periodic cell), shear_offset, shift and jump (in a sheared cell), cell_low and
+!>                  cell_size (if the size of the cell is stress-controlled)
 !>     /walls       id; force and torque on the fixed bodies, and present if walls vanish: one row per frame
-!>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
-!>                  normal, length, force, couple: one row per contact (optional)
+!>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second and the columns of
+!>                  `polydem_contact_columns`: one row per contact (optional)
 !>     /energy_balance      energy balance: one data set per entry, one row per frame (optional)
 !>     /series      step, time and named values: one data set per column, one row per step of the series up to the last
 !>                  frame of the segment (optional)
@@ -25,13 +25,13 @@
 module polydem_trajectory_segment
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_contact_resultant, only: find_resultant
-   use polydem_contacts, only: contact_force, contacts_t
+   use polydem_contact_columns, only: contact_columns, values_of
+   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_frame_poses, only: write_poses
    use polydem_row_distribution, only: component, row_distribution_t, vector
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
-   use polydem_kinds, only: bp, dp, ip, lp, wp
+   use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs, order_vertices
    use polydem_series, only: series_t
@@ -210,8 +210,8 @@ contains
       call file%write('/walls/force', force, error, 'N/m', 'forces of the other bodies on each fixed body', &
                       rows=one_row)
       call file%write('/walls/torque', torque, error, 'N', 'torques about its centre of mass', rows=one_row)
-      if (allocated(bodies%gone)) call file%write( &
-         '/walls/present', int(pack(merge(0, 1, bodies%gone(:bodies%n)), bodies%fixed(:bodies%n)), bp), error, '1', &
+      if (allocated(bodies%removed)) call file%write( &
+         '/walls/present', int(pack(merge(0, 1, bodies%removed(:bodies%n)), bodies%fixed(:bodies%n)), bp), error, '1', &
          '1: present, 0: its wall has vanished', rows=one_row)
    end subroutine add_walls
 
@@ -229,23 +229,17 @@ contains
       type(part_t) :: part
       integer(lp), allocatable :: ids(:, :), pairs(:, :)
       real(dp), allocatable :: values(:, :), block(:, :)
-      real(wp) :: shift(2), couple
       integer(ip) :: c
+      integer :: k, place
 
       associate (n => contacts%n)
-         allocate (ids(2, n), values(9, n))
+         allocate (ids(2, n), values(sum(contact_columns%width), n))
          do c = 1_ip, n
-            ids(1, c) = int(bodies%id(contacts%first(c)), lp)
-            ids(2, c) = int(bodies%id(contacts%second(c)), lp)
-            call find_resultant(bodies, contacts, c, shift, couple)
-            values(1, c) = real(contacts%area(c), dp)
-            values(2:3, c) = real(bodies%position(:, contacts%first(c)) + (contacts%arm_first(:, c) + shift), dp)
-            values(4:5, c) = real(-contacts%direction(:, c), dp)
-            values(6, c) = real(contacts%area(c)/contacts%depth(c), dp)
-            values(7:8, c) = real(contact_force(contacts, c), dp)
-            values(9, c) = real(couple, dp)
+            ids(1, c) = int(bodies%id(contacts%row(c)%first), lp)
+            ids(2, c) = int(bodies%id(contacts%row(c)%second), lp)
+            values(:, c) = values_of(bodies, contacts, c)
          end do
-         call order_pairs(comm, bodies, contacts%first(:n), contacts%second(:n), blocks)
+         call order_pairs(comm, bodies, contacts%row(:n)%first, contacts%row(:n)%second, blocks)
       end associate
       call blocks%to_blocks(comm, ids, pairs)
       call blocks%to_blocks(comm, values, block)
@@ -260,19 +254,19 @@ contains
                       'identifier of the first body, the lower one', part, rows=many_rows)
       call file%write('/contacts/second', int(pairs(2, :), ip), error, '1', 'identifier of the second body', part, &
                       rows=many_rows)
-      call file%write('/contacts/area', component(block, 1), error, 'm2', &
-                      'area of the overlap; with the conservative law its effective area', part, rows=many_rows)
-      call file%write('/contacts/point', vector(block, 2), error, 'm', &
-                      'point within both bodies where the force acts, in the world', part, rows=many_rows)
-      call file%write('/contacts/normal', vector(block, 4), error, '1', 'unit normal from the first body into the '// &
-                      'second', part, rows=many_rows)
-      call file%write('/contacts/length', component(block, 6), error, 'm', &
-                      'length of the contact: the area over the depth', part, rows=many_rows)
-      call file%write('/contacts/force', vector(block, 7), error, 'N/m', &
-                      'force on the first body; the second feels the opposite', part, rows=many_rows)
-      call file%write('/contacts/couple', component(block, 9), error, 'N', &
-                      'torque on the first body besides that of the force; the second feels the opposite', part, &
-                      rows=many_rows)
+      place = 1
+      do k = 1, size(contact_columns)
+         associate (label => contact_columns(k)%label_t)
+            if (contact_columns(k)%width == 1) then
+               call file%write('/contacts/'//trim(label%name), component(block, place), error, trim(label%unit), &
+                               trim(label%meaning), part, rows=many_rows)
+            else
+               call file%write('/contacts/'//trim(label%name), vector(block, place), error, trim(label%unit), &
+                               trim(label%meaning), part, rows=many_rows)
+            end if
+         end associate
+         place = place + contact_columns(k)%width
+      end do
    end subroutine add_contacts
 
    !> Add a row of the energy balance.
@@ -283,10 +277,12 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      if (.not. allocated(row%name)) return
-      do k = 1, size(row%name)
-         call file%write('/energy_balance/'//trim(row%name(k)), row%value(k), error, trim(row%unit(k)), &
-                         trim(row%meaning(k)), rows=one_row)
+      if (.not. allocated(row%label)) return
+      do k = 1, size(row%label)
+         associate (label => row%label(k))
+            call file%write('/energy_balance/'//trim(label%name), row%value(k), error, trim(label%unit), &
+                            trim(label%meaning), rows=one_row)
+         end associate
       end do
    end subroutine add_balance
 
@@ -303,10 +299,10 @@ contains
       group = '/'//trim(series%name)//'/'
       call file%write(group//'step', series%step(:series%n), error, '1', 'number of the time step', rows=many_rows)
       call file%write(group//'time', series%time(:series%n), error, 's', 'simulated time', rows=many_rows)
-      do k = 1, size(series%row%name)
-         associate (row => series%row)
-            call file%write(group//trim(row%name(k)), series%value(k, :series%n), error, trim(row%unit(k)), &
-                            trim(row%meaning(k)), rows=many_rows)
+      do k = 1, size(series%row%label)
+         associate (label => series%row%label(k))
+            call file%write(group//trim(label%name), series%value(k, :series%n), error, trim(label%unit), &
+                            trim(label%meaning), rows=many_rows)
          end associate
       end do
    end subroutine add_series

@@ -65,7 +65,7 @@ module polydem_trajectory_writer
 contains
 
    !> Prepare for writing. The folder is created if necessary. It must not contain a result other than the segments of
-   !> earlier attempts of the same run.
+   !> previous starts of the same run.
    subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number, comm, is_ragged)
       class(trajectory_writer_t), intent(inout) :: self
       !> Folder of the result

@@ -3,7 +3,7 @@
 !> A body of common size has one box, the bounds of its turned vertices. The box of a much larger body, such as a long
 !> wall, would overlap half the scene. A large body is therefore cut into tiles (`polydem_body_tiles`), and each tile
 !> has its own box. The body itself remains one polygon. The pieces of a body of several pieces are such tiles, or are
-!> cut into tiles like a body. A body of a wall that has vanished has no box.
+!> cut into tiles like a body. A body of a wall that was removed has no box.
 !>
 !> If two polygons share a point, their boxes share a point. For whole bodies this follows from the monotonicity of
 !> rounding. Boxes of tiles are padded by a few rounding errors of the size of the body: no gap opens between them when
@@ -86,7 +86,8 @@ contains
       call cut_bodies(maker, bodies, largest_ratio, boxes%n, error)
       if (allocated(error)) return
       boxes%n_pieces = bodies%pieces%n_pieces()
-      boxes%one_to_one = boxes%n == boxes%n_pieces .and. bodies%pieces%most == 1_ip .and. .not. allocated(bodies%gone)
+      boxes%one_to_one = boxes%n == boxes%n_pieces .and. bodies%pieces%most == 1_ip &
+                         .and. .not. allocated(bodies%removed)
       allocate (boxes%bounds(4, boxes%n), boxes%piece(boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), &
                 boxes%passive(boxes%n), boxes%reach(boxes%n))
       do s = 1_ip, bodies%n
@@ -106,7 +107,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(cut_body_t), allocatable :: longer(:)
       integer(ip) :: s, room, n_cut, n_tiles, known
-      logical :: fits, is_gone
+      logical :: fits, is_removed
 
       room = most_tiles
       n_boxes = 0_ip
@@ -115,23 +116,22 @@ contains
       do s = 1_ip, bodies%n
          known = maker%tiles%n
          fits = .true.
-         is_gone = .false.
-         if (allocated(bodies%gone)) is_gone = bodies%gone(s)
+         is_removed = .false.
+         if (allocated(bodies%removed)) is_removed = bodies%removed(s)
          ! A body of small radius is small enough for certain.
-         if (.not. is_gone .and. bodies%pieces%most > 1_ip) then
+         if (.not. is_removed .and. bodies%pieces%most > 1_ip) then
             call cut_pieces(bodies%pieces, s, maker%median_diameter, largest_ratio, roundings, room, maker%tiles, &
                             maker%piece, fits)
-         else if (.not. is_gone .and. &
+         else if (.not. is_removed .and. &
              2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) then
-            call cut_body(bodies%pieces%polygon(s), &
-                          maker%median_diameter, largest_ratio, room, maker%tiles, fits)
+            call cut_body(bodies%pieces%polygon(s), maker%median_diameter, largest_ratio, room, maker%tiles, fits)
          end if
          n_tiles = maker%tiles%n - known
          if (.not. fits) then
             call refuse_tiles(bodies%id(s), bodies%diameter(s)/maker%median_diameter, most_tiles, error)
             return
          end if
-         if (n_tiles == 0_ip .and. .not. is_gone) then
+         if (n_tiles == 0_ip .and. .not. is_removed) then
             n_boxes = n_boxes + 1_ip
             maker%box(s) = n_boxes
             cycle

@@ -15,6 +15,7 @@ module polydem_description
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text, counted
    use polydem_scene_measures, only: scene_measures_t
+   use polydem_wall, only: have_same_drivers
    implicit none
    private
    public :: describe, list_overlaps
@@ -275,7 +276,7 @@ contains
       character(len=:), allocatable :: text
 
       text = ''
-      associate (gravity => simulation%settings%forces%gravity)
+      associate (gravity => simulation%forces%gravity)
          if (abs(gravity(1)) + abs(gravity(2)) > 0.0_wp) text = ', gravity'
       end associate
    end function gravity_text
@@ -284,20 +285,33 @@ contains
    function motion_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation
       character(len=:), allocatable :: text, kinds
+      ! First slot of each wall that is not told yet
+      integer(ip) :: first(size(simulation%walls%wall))
+      integer(lp) :: n
       integer :: j, k
 
       text = ''
-      do k = 1, size(simulation%walls%driven)
-         associate (wall => simulation%walls%driven(k))
+      associate (walls => simulation%walls)
+         do k = 1, size(first)
+            first(k) = huge(1_ip)
+            if (walls%wall(k)%is_driven()) first(k) = minval(walls%wall(k)%slots)
+         end do
+         do while (any(first < huge(1_ip)))
+            k = minloc(first, 1)
             kinds = ''
-            do j = 1, size(wall%motions)
-               kinds = kinds//' and '//wall%motions(j)%motion%kind
+            do j = 1, size(walls%wall(k)%motions)
+               kinds = kinds//' and '//walls%motions(walls%wall(k)%motions(j))%motion%kind
             end do
-            if (wall%is_loaded) kinds = kinds//' and load-controlled'
-            text = text//', '//kinds(len(' and ') + 1:)
-            text = text//' of '//counted(size(wall%slots, kind=lp), 'wall')
-         end associate
-      end do
+            if (size(walls%wall(k)%loads) > 0) kinds = kinds//' and load-controlled'
+            n = 0_lp
+            do j = 1, size(first)
+               if (.not. have_same_drivers(walls%wall(j), walls%wall(k))) cycle
+               n = n + size(walls%wall(j)%slots, kind=lp)
+               first(j) = huge(1_ip)
+            end do
+            text = text//', '//kinds(len(' and ') + 1:)//' of '//counted(n, 'wall')
+         end do
+      end associate
    end function motion_text
 
    !> ', energy balance' if the run evaluates it; else empty

@@ -105,15 +105,15 @@ contains
       real(wp) :: extents(2, 2, 2), start(2, 2)
       integer :: axis, i, j, k, lower, upper
 
-      associate (loads => simulation%walls%loads, named => simulation%walls%named, bodies => simulation%bodies)
+      associate (loads => simulation%walls%loads, walls => simulation%walls%wall, bodies => simulation%bodies)
          do k = 2, size(loads)
             do j = 1, k - 1
                axis = loads(j)%direction
                if (axis == along_angle .or. loads(k)%direction /= axis .or. loads(j)%wall == loads(k)%wall) cycle
                if (bodies%cell%size(axis) > 0.0_wp) cycle
                do i = 1, 2
-                  extents(:, 1, i) = named%extent(loads(j)%wall, i, bodies)
-                  extents(:, 2, i) = named%extent(loads(k)%wall, i, bodies)
+                  extents(:, 1, i) = walls(loads(j)%wall)%extent(i, bodies)
+                  extents(:, 2, i) = walls(loads(k)%wall)%extent(i, bodies)
                end do
                associate (across => extents(:, :, 3 - axis), along => extents(:, :, axis))
                   if (maxval(across(1, :)) >= minval(across(2, :))) cycle

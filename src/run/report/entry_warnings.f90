@@ -247,7 +247,7 @@ contains
       integer :: axis, k
 
       do k = 1, size(simulation%settings%sink)
-         associate (sink => simulation%settings%sink(k), gravity => simulation%settings%forces%gravity)
+         associate (sink => simulation%settings%sink(k), gravity => simulation%forces%gravity)
             axis = maxloc(abs(gravity), 1)
             thickness = minval(sink%high - sink%low)
             if (any(abs(gravity) > 0.0_wp)) thickness = sink%high(axis) - sink%low(axis)

@@ -6,16 +6,16 @@ module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse, two_pi
    use polydem_entry_warnings, only: warn_of_entries
    use polydem_fixed_overlaps, only: find_fixed_overlaps
-   use polydem_motion_check, only: shorter_step
+   use polydem_guard, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_parts, only: parts_t
    use polydem_regions, only: is_beside_walls
-   use polydem_settings, only: grains_settings_t, settings_t
+   use polydem_settings, only: forces_settings_t, grains_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
-   use polydem_vanished_walls, only: warn_of_vanished
+   use polydem_removed_walls, only: warn_of_removed
    use polydem_wall_warnings, only: add
    implicit none
    private
@@ -59,11 +59,11 @@ contains
       call warn_of_overlaps(simulation, measures, warnings)
       call warn_of_speeds(simulation, measures, warnings)
       call warn_of_fixed_overlaps(simulation, warnings)
-      call warn_of_regions(simulation%settings, warnings)
+      call warn_of_regions(simulation%settings, simulation%forces, warnings)
       call warn_of_tables(simulation, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       call warn_of_entries(simulation, measures, warnings)
-      call warn_of_vanished(simulation%settings, warnings)
+      call warn_of_removed(simulation%settings, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
       if (undamped /= '') call add(warnings, undamped)
@@ -78,18 +78,16 @@ contains
       type(simulation_t), intent(in) :: simulation
       type(text_t), allocatable, intent(inout) :: warnings(:)
       real(wp) :: last
-      integer :: j, k
+      integer :: k
 
-      do k = 1, size(simulation%walls%driven)
-         do j = 1, size(simulation%walls%driven(k)%motions)
-            associate (motion => simulation%walls%driven(k)%motions(j)%motion, &
-                       duration => simulation%settings%integrate%duration)
-               last = motion%rests_from()
-               if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
-                  'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
-                  to_text(duration, 3)//' s; from then on its bodies rest in the last pose')
-            end associate
-         end do
+      do k = 1, size(simulation%walls%motions)
+         associate (motion => simulation%walls%motions(k)%motion, duration => simulation%settings%integrate%duration)
+            if (.not. motion%rests_after < huge(1.0_wp)) cycle
+            last = motion%start + motion%rests_after
+            if (last < min(duration, motion%end)*(1.0_wp - 1.0e-9_wp)) call add(warnings, &
+               'the table of a motion ends at '//to_text(last, 3)//' s, before the run does at '// &
+               to_text(duration, 3)//' s; from then on its bodies rest in the last pose')
+         end associate
       end do
    end subroutine warn_of_tables
 
@@ -124,8 +122,10 @@ contains
    end subroutine warn_of_units
 
    !> Warn of groups of grains that will meet no wall.
-   subroutine warn_of_regions(settings, warnings)
+   subroutine warn_of_regions(settings, forces, warnings)
       type(settings_t), intent(in) :: settings
+      !> Parameters of the forces at the start
+      type(forces_settings_t), intent(in) :: forces
       type(text_t), allocatable, intent(inout) :: warnings(:)
       type(parts_t) :: parts
       integer :: k
@@ -135,9 +135,9 @@ contains
       if (any([(moves_away(settings%motion(k)%kind), k=1, size(settings%motion))]) .or. size(settings%load) > 0) return
       parts%walls = settings%wall
       do k = 1, size(settings%grains)
-         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, settings%grains(k)))) call add(warnings, &
-            'the grains of group '//settings%grains(k)%name//' start beside all walls and will meet none; move '// &
-            'their region between or above the walls')
+         if (is_beside_walls(settings%grains(k), parts, ways_of(settings, forces, settings%grains(k)))) &
+            call add(warnings, 'the grains of group '//settings%grains(k)%name//' start beside '// &
+                     'all walls and will meet none; move their region between or above the walls')
       end do
    end subroutine warn_of_regions
 
@@ -150,25 +150,25 @@ contains
 
    !> Whether the grains of a group go against and along each axis: by gravity, with their velocity, or through the
    !> copies of a periodic cell, (axis, sense)
-   pure function ways_of(settings, group) result(ways)
+   pure function ways_of(settings, forces, group) result(ways)
       type(settings_t), intent(in) :: settings
+      !> Parameters of the forces at the start
+      type(forces_settings_t), intent(in) :: forces
       type(grains_settings_t), intent(in) :: group
       logical :: ways(2, 2)
       integer :: axis, k
 
-      associate (forces => settings%forces)
-         ways(:, 1) = group%velocity < 0.0_wp .or. forces%gravity < 0.0_wp
-         ways(:, 2) = group%velocity > 0.0_wp .or. forces%gravity > 0.0_wp
-         do k = 1, size(settings%stage)
-            if (size(settings%stage(k)%gravity) /= 2) cycle
-            ways(:, 1) = ways(:, 1) .or. settings%stage(k)%gravity < 0.0_wp
-            ways(:, 2) = ways(:, 2) .or. settings%stage(k)%gravity > 0.0_wp
-         end do
-         do axis = 1, 2
-            ways(axis, :) = ways(axis, :) .or. group%speed > 0.0_wp .or. abs(forces%turn_rate) > 0.0_wp .or. &
-               abs(forces%shake(axis)) > 0.0_wp .or. scan(settings%cell%periodic, 'xy'(axis:axis)) > 0
-         end do
-      end associate
+      ways(:, 1) = group%velocity < 0.0_wp .or. forces%gravity < 0.0_wp
+      ways(:, 2) = group%velocity > 0.0_wp .or. forces%gravity > 0.0_wp
+      do k = 1, size(settings%stage)
+         if (size(settings%stage(k)%gravity) /= 2) cycle
+         ways(:, 1) = ways(:, 1) .or. settings%stage(k)%gravity < 0.0_wp
+         ways(:, 2) = ways(:, 2) .or. settings%stage(k)%gravity > 0.0_wp
+      end do
+      do axis = 1, 2
+         ways(axis, :) = ways(axis, :) .or. group%speed > 0.0_wp .or. abs(forces%turn_rate) > 0.0_wp .or. &
+            abs(forces%shake(axis)) > 0.0_wp .or. scan(settings%cell%periodic, 'xy'(axis:axis)) > 0
+      end do
    end function ways_of
 
    !> Warn of a time step that is unstable as soon as bodies touch.
@@ -275,8 +275,8 @@ contains
 
       associate (bodies => simulation%bodies)
          is_loaded = spread(.false., 1, bodies%n)
-         do k = 1, size(simulation%walls%driven)
-            if (simulation%walls%driven(k)%is_loaded) is_loaded(simulation%walls%driven(k)%slots) = .true.
+         do k = 1, size(simulation%walls%wall)
+            if (size(simulation%walls%wall(k)%loads) > 0) is_loaded(simulation%walls%wall(k)%slots) = .true.
          end do
          call find_fixed_overlaps(bodies, is_loaded, n, first, second, area, place)
          if (n == 0_lp) return

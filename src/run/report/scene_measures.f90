@@ -9,14 +9,13 @@ module polydem_scene_measures
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
-   use polydem_motion_check, only: greatest_displacement, place_of
+   use polydem_motion_tests, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
    use polydem_run_duration, only: longest_run
    use polydem_simulation, only: simulation_t
-   use polydem_stability_check, only: find_stable_step
+   use polydem_step_guard, only: find_stable_step
    use polydem_strings, only: to_text
-   use polydem_wall, only: greatest_wall_speed
    use polydem_walls, only: walls_t
    implicit none
    private
@@ -96,7 +95,6 @@ contains
       real(wp), allocatable :: thinner(:)
       real(wp) :: gravity, down(2)
       integer(ip) :: slot
-      integer :: k
 
       associate (s => simulation, comm => simulation%comm)
          measures%fixed_boxes = count(s%search%boxes%fixed(:s%search%boxes%n), kind=lp)
@@ -113,14 +111,11 @@ contains
          call greatest_displacement(s%bodies, s%moving(:s%n_moving), s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
-         do k = 1, size(s%walls%driven)
-            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls%driven(k), s%bodies%radius, &
-                                                                               longest_run(s%settings)))
-         end do
+         measures%wall_speed = s%walls%greatest_speed(s%bodies, longest_run(s%settings))
          call measure_sides(comm, s%bodies, s%walls, measures%sides)
-         gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
+         gravity = hypotenuse(s%forces%gravity(1), s%forces%gravity(2))
          if (gravity > 0.0_wp) then
-            down = abs(s%settings%forces%gravity)/gravity
+            down = abs(s%forces%gravity)/gravity
             measures%potential = gravity*measures%mass(3)*along(measures%extent)
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
             measures%static_depth = [measures%mass(1)*gravity, measures%density(2)*gravity &
@@ -168,7 +163,7 @@ contains
       end do
       counts(3) = measures%boxes
       do c = 1_ip, contacts%n
-         if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+         if (.not. owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) cycle
          counts(4) = counts(4) + 1_lp
          if (depth_share(contacts, thinner, c) > limit) counts(5) = counts(5) + 1_lp
       end do
@@ -217,18 +212,18 @@ contains
       if (worst > 0_ip) then
          measures%depth_share = depth_share(contacts, thinner, worst)
          measures%deepest = depth_text(bodies, contacts, thinner, worst)
-         place = place_of(bodies, contacts%first(worst), contacts%second(worst))
+         place = place_of(bodies, contacts%row(worst)%first, contacts%row(worst)%second)
       end if
       do c = 1_ip, contacts%n
-         depth = contacts%depth(c)
+         depth = contacts%row(c)%depth
          if (depth <= greatest) cycle
          greatest = depth
          worst = c
       end do
       if (worst > 0_ip) then
-         longest = place_of(bodies, contacts%first(worst), contacts%second(worst))
+         longest = place_of(bodies, contacts%row(worst)%first, contacts%row(worst)%second)
          measures%longest_depth = to_text(greatest, 3)//' m between the bodies '// &
-            to_text(bodies%id(contacts%first(worst)))//' and '//to_text(bodies%id(contacts%second(worst)))
+            to_text(bodies%id(contacts%row(worst)%first))//' and '//to_text(bodies%id(contacts%row(worst)%second))
       end if
       call keep_greatest(comm, measures%depth_share, place, measures%deepest)
       call keep_greatest(comm, greatest, longest, measures%longest_depth)
@@ -280,11 +275,11 @@ contains
       do k = 1, size(walls%loads)
          associate (load => walls%loads(k))
             if (load%direction /= along_angle) cycle
-            line = walls%named%centre(load%wall, bodies) - load%pivot
+            line = walls%wall(load%wall)%centre(bodies) - load%pivot
             if (.not. any(abs(line) > 0.0_wp)) cycle
             line = line/hypotenuse(line(1), line(2))
             ! The wall: it begins on one side of the pivot.
-            bounds = distances(bodies, walls%named%wall(load%wall)%slots, load%pivot, line)
+            bounds = distances(bodies, walls%wall(load%wall)%slots, load%pivot, line)
             if (bounds(3, 1) < -0.1_wp*bounds(3, 2)) cycle
             sides(3, k) = bounds(2, 1) - bounds(1, 1)
             bounds = distances(bodies, bodies%free, load%pivot, line)

@@ -2,6 +2,7 @@
 module polydem_series_row
    use polydem_sample_columns, only: set_sample_columns
    use polydem_simulation, only: simulation_t
+   use polydem_wall_record, only: set_wall_columns
    implicit none
    private
    public :: collect_row
@@ -15,7 +16,7 @@ contains
       type(simulation_t), intent(inout) :: self
 
       call set_sample_columns(self, self%series%row)
-      call self%walls%set_columns(self%comm, self%dt, self%bodies, self%loop%walls, self%series%row)
+      call set_wall_columns(self%walls, self%comm, self%dt, self%bodies, self%loop%walls, self%series%row)
       if (allocated(self%traffic)) call self%traffic%set_columns(self%series%row)
    end subroutine collect_row
 

@@ -40,7 +40,7 @@ contains
                free = measures%sides(1:2, k)
             else
                if (cell%size(load%direction) > 0.0_wp) cycle
-               extent = simulation%walls%named%extent(load%wall, load%direction, simulation%bodies)
+               extent = simulation%walls%wall(load%wall)%extent(load%direction, simulation%bodies)
                free = measures%free_extent(load%direction, :)
             end if
             ! Bodies reach into a row of grains, but not beyond the middle of the wall.

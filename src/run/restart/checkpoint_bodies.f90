@@ -65,7 +65,7 @@ contains
 
    !> Read the bodies of a rank: all fixed bodies, and a share of the free ones. The rows of /bodies stay chosen, so
    !> that columns of other objects over these bodies can follow.
-   subroutine read_bodies(serializer, comm, bodies, gone)
+   subroutine read_bodies(serializer, comm, bodies, removed)
       !> Serializer; its `error` holds a failure, also if the bodies are invalid
       class(serializer_t), intent(inout) :: serializer
       class(communicator_t), intent(in) :: comm
@@ -73,14 +73,14 @@ contains
       !> checkpoint
       type(bodies_t), intent(inout) :: bodies
       !> Rows of bodies that are left out, ascending; default: none
-      integer(ip), intent(in), optional :: gone(:)
+      integer(ip), intent(in), optional :: removed(:)
       type(taken_t) :: taken
       integer(ip) :: k, last_id(1), most_pieces
       integer :: isa
       logical :: has_materials
       type(cell_t) :: cell
 
-      call choose_bodies(serializer, comm, taken, gone)
+      call choose_bodies(serializer, comm, taken, removed)
       if (allocated(serializer%error)) return
       last_id = 0_ip
       call serialize_last(serializer, last_id)
@@ -109,13 +109,13 @@ contains
 
    !> Choose the bodies that a rank takes: all fixed ones, and the free ones of one block of rows. For this it looks
    !> through all rows of a few columns, some at a time.
-   subroutine choose_bodies(serializer, comm, taken, gone)
+   subroutine choose_bodies(serializer, comm, taken, removed)
       class(serializer_t), intent(inout) :: serializer
       class(communicator_t), intent(in) :: comm
       !> The bodies
       type(taken_t), intent(out) :: taken
       !> Rows of bodies that no rank takes, ascending
-      integer(ip), intent(in), optional :: gone(:)
+      integer(ip), intent(in), optional :: removed(:)
       integer(ip), allocatable :: id(:), fixed(:), corners(:)
       logical, allocatable :: is_taken(:)
       integer(lp), allocatable :: row(:)
@@ -147,7 +147,8 @@ contains
             '/bodies/id does not ascend')
          if (allocated(serializer%error)) return
          is_taken = fixed == 1_ip .or. ((row - 1_lp)*int(comm%size, lp))/n == int(comm%rank, lp)
-         if (present(gone)) is_taken(pack(gone - first, gone > first .and. gone <= first + size(row))) = .false.
+         if (present(removed)) &
+            is_taken(pack(removed - first, removed > first .and. removed <= first + size(row))) = .false.
          taken%row = [taken%row, pack(row, is_taken)]
          taken%corners = [taken%corners, pack(corners, is_taken)]
          call append_vertices(is_taken, corners, vertex, taken%vertex)
@@ -156,9 +157,9 @@ contains
       if (vertex < n_vertices) call raise(serializer%error, input_error, &
          '/pieces/corners does not add up to the rows of /vertices/position')
       taken%index = int(taken%row, ip)
-      if (.not. present(gone)) return
-      taken%n_all = int(n, ip) - size(gone, kind=ip)
-      taken%index = [(taken%index(k) - place_in(gone, taken%index(k)) + 1_ip, k=1_lp, size(taken%index, kind=lp))]
+      if (.not. present(removed)) return
+      taken%n_all = int(n, ip) - size(removed, kind=ip)
+      taken%index = [(taken%index(k) - place_in(removed, taken%index(k)) + 1_ip, k=1_lp, size(taken%index, kind=lp))]
    end subroutine choose_bodies
 
    !> Append the rows of the vertices of those bodies that are taken.

@@ -14,55 +14,50 @@ module polydem_checkpoint_fields
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_monitor, only: serialize_monitor, monitor_t
+   use polydem_monitor, only: serialize_guards
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
-   use polydem_packed_state, only: find_walls
    use polydem_participants, only: serialize_participants
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_run_stages, only: serialize_stages
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_wall, only: hash_of_tables
    implicit none
    private
-   public :: attempts_t, serialize_run, serialize_progress, read_pairs
+   public :: restarts_t, serialize_run, serialize_progress, read_pairs
 
    !> Number of pairs that are read at a time
    integer(lp), parameter :: most_rows = 65536_lp
 
-   !> Hash of the initial scene, and counts of all attempts of a run
-   type :: attempts_t
+   !> Hash of the initial scene, and counts of a run with its restarts
+   type :: restarts_t
       !> `hash_scene` of the bodies at time 0
       integer(lp) :: scene = 0_lp
-      !> Number of attempts, including the present one
-      integer(lp) :: attempts = 1_lp
+      !> Number of restarts so far
+      integer(lp) :: number = 0_lp
       !> Elapsed time of the run up to the checkpoint, without repeated steps [s]
       real(dp) :: seconds = 0.0_dp
       !> Number of closed segments of the trajectory
       integer(lp) :: segments = 0_lp
-   end type attempts_t
+   end type restarts_t
 
 contains
 
    !> Write the state of a run to a serializer, or restore it from there.
-   subroutine serialize_run(serializer, simulation, attempts, monitor)
+   subroutine serialize_run(serializer, simulation, restarts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Written: the simulation at the end of a step. Restored: on entry any state of the same scene, on return the
       !> stored state without contacts, which the next step computes
       type(simulation_t), intent(inout) :: simulation
-      type(attempts_t), intent(inout) :: attempts
-      type(monitor_t), intent(inout) :: monitor
-      integer(ip), allocatable :: former(:)
+      type(restarts_t), intent(inout) :: restarts
 
-      call serialize_global(serializer, simulation, attempts, monitor)
+      call serialize_global(serializer, simulation, restarts)
       associate (s => simulation)
          if (serializer%is_reading) then
-            former = s%bodies%id
             call read_bodies(serializer, s%comm, s%bodies)
             if (.not. allocated(serializer%error)) call s%motion%integrator%start(s%bodies)
          else
-            call total_forces(s%settings%forces%gravity, s%loop%force_sums, s%bodies)
+            call total_forces(s%forces%gravity, s%loop%force_sums, s%bodies)
             call save_bodies(serializer, s%bodies)
          end if
          call s%motion%integrator%serialize(serializer)
@@ -79,32 +74,26 @@ contains
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
-         call find_walls(former, s%bodies%id, s%walls%driven)
          call rebuild_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
 
    !> Serialize the global fields: those of the whole run, not of bodies, boxes or pairs.
-   subroutine serialize_global(serializer, simulation, attempts, monitor)
+   subroutine serialize_global(serializer, simulation, restarts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       type(simulation_t), intent(inout) :: simulation
-      type(attempts_t), intent(inout) :: attempts
-      type(monitor_t), intent(inout) :: monitor
-      integer(lp), allocatable :: tables(:)
-      integer :: k
+      type(restarts_t), intent(inout) :: restarts
+      integer(lp) :: tables
 
-      call serialize_progress(serializer, simulation%step, attempts)
-      call serialize_monitor(monitor, serializer)
+      call serialize_progress(serializer, simulation%step, restarts)
+      call serialize_guards(simulation, serializer)
       associate (s => simulation)
          call serialize_stages(s%stages, serializer)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
-         call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
-         associate (driven => s%walls%driven)
-            tables = [(hash_of_tables(driven(k)), k=1, size(driven))]
-            if (any(tables /= 0_lp)) call serializer%match('/run/motion_tables', tables, '1', &
-                                                           'hash of the tables of motions')
-         end associate
+         call serializer%match('/run/scene', [restarts%scene], '1', 'hash of the bodies at the start')
+         tables = s%walls%hash_of_tables()
+         if (tables /= 0_lp) call serializer%match('/run/motion_tables', [tables], '1', 'hash of the tables of motions')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
                            'ended, contacts without direction')
@@ -118,20 +107,20 @@ contains
    end subroutine serialize_global
 
    !> Serialize the progress of a run. This part of `serialize_run` needs no simulation.
-   subroutine serialize_progress(serializer, step, attempts)
+   subroutine serialize_progress(serializer, step, restarts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Number of completed steps
       integer(lp), intent(inout) :: step
-      type(attempts_t), intent(inout) :: attempts
+      type(restarts_t), intent(inout) :: restarts
       real(dp) :: seconds(1)
 
       call serializer%field('/run/step', step, '1', 'completed steps')
-      call serializer%field('/run/attempts', attempts%attempts, '1', 'attempts, including the present one')
-      call serializer%field('/run/segments', attempts%segments, '1', 'closed segments of the trajectory')
-      seconds = attempts%seconds
+      call serializer%field('/run/restarts', restarts%number, '1', 'restarts so far')
+      call serializer%field('/run/segments', restarts%segments, '1', 'closed segments of the trajectory')
+      seconds = restarts%seconds
       call serializer%seconds_field('/run/seconds', seconds, 'elapsed time of the run, without repeated steps')
-      attempts%seconds = seconds(1)
+      restarts%seconds = seconds(1)
    end subroutine serialize_progress
 
    !> Save the pairs and their contact history.

@@ -2,7 +2,7 @@
 !>
 !> Clocks are monotonic, so setting the date has no effect. The schedule polls for signals at most 20 times per second.
 module polydem_checkpoint_schedule
-   use polydem_checkpoint_fields, only: attempts_t, serialize_run
+   use polydem_checkpoint_fields, only: restarts_t, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: communicator_t
@@ -10,7 +10,6 @@ module polydem_checkpoint_schedule
    use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
-   use polydem_monitor, only: monitor_t
    use polydem_ownership, only: order_bodies, order_pieces, order_vertices
    use polydem_provenance, only: provenance_t
    use polydem_result_files, only: checkpoint_path, n_checkpoints
@@ -31,17 +30,17 @@ module polydem_checkpoint_schedule
       integer(lp) :: last_step = -1_lp
       !> Number of the file that the next checkpoint overwrites, which holds the oldest one
       integer(ip) :: next = 1_ip
-      !> Number of checkpoints written by this attempt
+      !> Number of checkpoints written since this start
       integer(ip) :: n = 0_ip
-      !> Elapsed time of all checkpoints of this attempt, and of the slowest one [s]
+      !> Elapsed time of all checkpoints since this start, and of the slowest one [s]
       real(dp) :: seconds = 0.0_dp, longest = 0.0_dp
       !> Steps between checkpoints: from the number of steps, and from the simulated time; 0: not used
       integer(lp), private :: steps(2) = 0_lp
       !> Elapsed time between checkpoints [s]
       real(dp), private :: interval = huge(1.0_dp)
-      !> Time of the last checkpoint, or start of the attempt [s]
+      !> Time of the last checkpoint, or start of the program [s]
       real(dp), private :: last_time = 0.0_dp
-      !> Time at which the attempt should end [s]
+      !> Time at which the program should end [s]
       real(dp), private :: deadline = huge(1.0_dp)
       !> Whether signals end the run
       logical, private :: heeds_signals = .true.
@@ -68,9 +67,9 @@ contains
       type(checkpoint_settings_t), intent(in) :: settings
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Start of the attempt, from `wall_seconds` [s]
+      !> Start of the program, from `wall_seconds` [s]
       real(dp), intent(in) :: began
-      !> Limit of the elapsed time of the attempt [s]; 0: no limit
+      !> Limit of the elapsed time since this start [s]; 0: no limit
       real(dp), intent(in) :: limit
       !> Whether signals end the run
       logical, intent(in) :: heeds_signals
@@ -115,7 +114,7 @@ contains
    end subroutine decide
 
    !> Write a checkpoint over the older of the last two; collective.
-   subroutine write_checkpoint(self, folder, provenance, comm, simulation, attempts, monitor, error)
+   subroutine write_checkpoint(self, folder, provenance, comm, simulation, restarts, error)
       class(checkpoints_t), intent(inout) :: self
       !> Result folder
       character(len=*), intent(in) :: folder
@@ -123,8 +122,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
-      type(attempts_t), intent(inout) :: attempts
-      type(monitor_t), intent(inout) :: monitor
+      type(restarts_t), intent(inout) :: restarts
       !> Allocated if the checkpoint cannot be written; the last two are then unchanged
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
@@ -140,7 +138,7 @@ contains
       call complete_wall_forces(comm, simulation%search%neighbours%pairs%first, simulation%loop%walls, &
                                 simulation%bodies)
       call collect_counts(simulation)
-      call serialize_run(file, simulation, attempts, monitor)
+      call serialize_run(file, simulation, restarts)
       call file%complete(error)
       call limit%lift()
       if (allocated(error)) return

@@ -1,8 +1,8 @@
-!> The time step of the earlier attempts of a run. A run that goes on keeps it, so that a step that is chosen
+!> The time step of the previous starts of a run. A run that goes on keeps it, so that a step that is chosen
 !> automatically does not change with the duration or with other entries.
 module polydem_former_step
    use polydem_broadcaster, only: broadcaster_t
-   use polydem_checkpoint_fields, only: attempts_t, serialize_progress
+   use polydem_checkpoint_fields, only: restarts_t, serialize_progress
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_errors, only: error_t
    use polydem_file_system, only: exists
@@ -27,7 +27,7 @@ contains
       integer(ip) :: k
 
       dt = 0.0_wp
-      if (.not. run%attempt%continues) return
+      if (.not. run%options%continues) return
       newest = -1_lp
       do k = 1_ip, merge(n_checkpoints, 0_ip, run%comm%is_root())
          if (allocated(ignored)) deallocate (ignored)
@@ -48,7 +48,7 @@ contains
       real(wp), intent(inout) :: dt
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
       integer(lp) :: step
       real(wp) :: found
 
@@ -56,7 +56,7 @@ contains
       if (allocated(error)) return
       step = -1_lp
       found = 0.0_wp
-      call serialize_progress(file, step, attempts)
+      call serialize_progress(file, step, restarts)
       call file%field('/run/time_step', found, 's', 'time step')
       call file%close(error)
       if (allocated(error) .or. step <= newest .or. .not. found > 0.0_wp) return

@@ -2,7 +2,7 @@
 module polydem_restart
    use polydem_changed_entries, only: changed_entries, is_extension
    use polydem_checked_files, only: check_closed, find_segments, find_stranger, read_frames
-   use polydem_checkpoint_fields, only: attempts_t, serialize_progress, serialize_run
+   use polydem_checkpoint_fields, only: restarts_t, serialize_progress, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_domain, only: new_domain
    use polydem_errors, only: error_t, input_error, io_error, raise
@@ -10,7 +10,6 @@ module polydem_restart
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
-   use polydem_monitor, only: monitor_t
    use polydem_provenance, only: origin_of
    use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_name, segment_path, trace_name
    use polydem_serializer, only: serializer_t
@@ -19,11 +18,12 @@ module polydem_restart
    use polydem_strings, only: quoted, to_text
    use polydem_timers, only: timers_t
    use polydem_wall_places, only: check_places
+   use polydem_wall_record, only: clear_record
    implicit none
    private
-   public :: restart_state_t, find_restart, restore, remove_surplus_files, serialize_earlier
+   public :: restart_state_t, find_restart, restore, remove_surplus_files, serialize_previous
 
-   !> State of the result folder after earlier attempts
+   !> State of the result folder after previous starts
    type :: restart_state_t
       !> Number of the checkpoint to restart from; 0: there is none, the run starts at step 0
       integer(ip) :: checkpoint = 0_ip
@@ -36,7 +36,7 @@ module polydem_restart
       !> Step of the last frame that the run keeps; negative if there is none. Frames up to it are not written again
       integer(lp) :: last_frame = -1_lp
       !> Lines for the log
-      character(len=:), allocatable :: remark
+      character(len=:), allocatable :: note
       !> Number of frames, first and last step of a last segment that has its final name but is not closed in the
       !> manifest; 0 if there is none
       integer(lp), private :: unlisted(3) = 0_lp
@@ -54,7 +54,7 @@ module polydem_restart
 contains
 
    !> Choose the newest valid checkpoint, and check that settings and initial bodies are unchanged.
-   subroutine find_restart(folder, manifest, simulation, scene, may_change, earlier, error)
+   subroutine find_restart(folder, manifest, simulation, scene, may_change, previous, error)
       !> Result folder; this run holds its lock
       character(len=*), intent(in) :: folder
       !> Valid manifest of the folder
@@ -65,47 +65,47 @@ contains
       character(len=*), intent(in) :: scene
       !> Whether the settings may differ from those of the checkpoint
       logical, intent(in) :: may_change
-      !> State of the folder after earlier attempts
-      type(restart_state_t), intent(out) :: earlier
+      !> State of the folder after previous starts
+      type(restart_state_t), intent(out) :: previous
       !> Allocated if the run cannot restart
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: changes, former
       logical :: is_longer
 
       call check_closed(manifest, folder, error)
-      if (.not. allocated(error)) call choose_checkpoint(folder, manifest, earlier, error)
+      if (.not. allocated(error)) call choose_checkpoint(folder, manifest, previous, error)
       if (allocated(error)) return
       associate (settings => simulation%settings)
-         if (earlier%checkpoint == 0_ip) then
-            call restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
+         if (previous%checkpoint == 0_ip) then
+            call restart_without_checkpoint(folder, manifest, settings, scene, previous, error)
             return
          end if
-         changes = changed_entries(earlier%former_settings, settings%resolved)
-         is_longer = is_extension(earlier%former_settings, settings%resolved)
-         former = origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene', error)
+         changes = changed_entries(previous%former_settings, settings%resolved)
+         is_longer = is_extension(previous%former_settings, settings%resolved)
+         former = origin_of(checkpoint_path(folder, previous%checkpoint), 'scene', error)
          if (allocated(error)) return
          if (changes /= '' .and. .not. (may_change .or. is_longer)) then
             call raise(error, input_error, 'the settings differ from those of the run in '//folder//': '//changes// &
                        '. Restore them, or add --changed to resume with the new settings from step '// &
-                       to_text(earlier%step))
+                       to_text(previous%step))
          else if (former /= scene) then
             call raise(error, input_error, folder//' holds the result of another run: '// &
                        why_other(settings, changes)//'. Restore it, or use --force instead of --continue to '// &
                        'start again')
-         else if (earlier%step > simulation%n_steps) then
-            call raise(error, input_error, checkpoint_path(folder, earlier%checkpoint)//' is of step '// &
-                       to_text(earlier%step)//', behind the end of the run at step '//to_text(simulation%n_steps)// &
+         else if (previous%step > simulation%n_steps) then
+            call raise(error, input_error, checkpoint_path(folder, previous%checkpoint)//' is of step '// &
+                       to_text(previous%step)//', behind the end of the run at step '//to_text(simulation%n_steps)// &
                        ': increase duration in &integrate')
          end if
          if (allocated(error)) return
-         earlier%is_changed = changes /= '' .and. .not. is_longer
-         if (changes /= '') earlier%remark = earlier%remark//new_line('a')// &
+         previous%is_changed = changes /= '' .and. .not. is_longer
+         if (changes /= '') previous%note = previous%note//new_line('a')// &
             trim(merge('extended  ', 'changed   ', is_longer))//repeat(' ', merge(3, 4, is_longer))//changes
-         if (is_longer .and. .not. settings%integrate%dt > 0.0_wp) earlier%remark = earlier%remark//new_line('a')// &
+         if (is_longer .and. .not. settings%integrate%dt > 0.0_wp) previous%note = previous%note//new_line('a')// &
             '           dt as before; a run that begins with integrate.dt = '//to_text(simulation%dt, 17)// &
             ' has the same bits'
       end associate
-      call count_segments(folder, manifest, changes /= '' .and. .not. is_longer, simulation%n_steps, earlier, error)
+      call count_segments(folder, manifest, changes /= '' .and. .not. is_longer, simulation%n_steps, previous, error)
    end subroutine find_restart
 
    !> Why the initial bodies differ from those of the earlier run: by entries, or by the contents of a file
@@ -146,15 +146,15 @@ contains
    end function packing_of
 
    !> Restart at step 0 without a checkpoint; keep the closed segments of a run of the same scene and settings.
-   subroutine restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
+   subroutine restart_without_checkpoint(folder, manifest, settings, scene, previous, error)
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       type(settings_t), intent(in) :: settings
-      type(restart_state_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: previous
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, changes, former, former_settings
 
-      earlier%remark = 'there is no checkpoint in '//folder//': the run starts at step 0'
+      previous%note = 'there is no checkpoint in '//folder//': the run starts at step 0'
       path = segment_path(folder, 1_ip)
       if (.not. exists(path, error)) path = folder//'/'//profile_name
       if (.not. exists(path, error)) return
@@ -164,7 +164,7 @@ contains
       changes = changed_entries(former_settings, settings%resolved)
       if (changes == '' .and. former /= scene) changes = why_other(settings, changes)
       if (changes == '') then
-         call count_segments(folder, manifest, .false., huge(1_lp), earlier, error)
+         call count_segments(folder, manifest, .false., huge(1_lp), previous, error)
       else
          call raise(error, input_error, folder//' has no checkpoint from which a run with other settings could '// &
                     'continue: '//changes//'. Choose another folder with --set output.folder=NAME, or use --force '// &
@@ -174,10 +174,10 @@ contains
 
    !> Read all checkpoints and choose the valid one with the greatest step. One that the system refuses to read may be
    !> good and newer, so it is an error.
-   subroutine choose_checkpoint(folder, manifest, earlier, error)
+   subroutine choose_checkpoint(folder, manifest, previous, error)
       character(len=*), intent(in) :: folder
       type(manifest_t), intent(in) :: manifest
-      type(restart_state_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: previous
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: problem
       type(restart_state_t) :: candidate
@@ -198,199 +198,198 @@ contains
             end if
             damage = damage//problem%message//new_line('a')
             deallocate (problem)
-         else if (earlier%checkpoint == 0_ip .or. candidate%step > earlier%step) then
-            earlier = candidate
+         else if (previous%checkpoint == 0_ip .or. candidate%step > previous%step) then
+            previous = candidate
          end if
       end do
       if (allocated(error)) return
-      if (earlier%checkpoint > 0_ip) then
-         earlier%remark = 'continued  from '//checkpoint_path(folder, &
-            earlier%checkpoint)//', step '//to_text(earlier%step)
-         if (damage /= '') earlier%remark = 'warning: '//damage//earlier%remark//', the newest valid checkpoint'
+      if (previous%checkpoint > 0_ip) then
+         previous%note = 'continued  from '//checkpoint_path(folder, &
+            previous%checkpoint)//', step '//to_text(previous%step)
+         if (damage /= '') previous%note = 'warning: '//damage//previous%note//', the newest valid checkpoint'
       else if (damage /= '') then
          call raise(error, io_error, folder//': no checkpoint can be used. '//damage//'Start the run '// &
                     'again with --force instead of --continue')
       end if
    end subroutine choose_checkpoint
 
-   !> Read step, attempts and settings of a checkpoint.
-   subroutine read_progress(path, run, earlier, error)
+   !> Read step, restarts and settings of a checkpoint.
+   subroutine read_progress(path, run, previous, error)
       character(len=*), intent(in) :: path, run
-      type(restart_state_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: previous
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(attempts_t) :: attempts
+      type(restarts_t) :: restarts
       character(len=:), allocatable :: stranger
 
       call file%open(path, error)
       if (allocated(error)) return
-      call serialize_progress(file, earlier%step, attempts)
-      earlier%segments_at_checkpoint = attempts%segments
-      if (.not. allocated(file%error)) call file%read_origin(earlier%revision, earlier%former_settings, error)
+      call serialize_progress(file, previous%step, restarts)
+      previous%segments_at_checkpoint = restarts%segments
+      if (.not. allocated(file%error)) call file%read_origin(previous%revision, previous%former_settings, error)
       call file%close(error)
       if (.not. allocated(error)) call find_stranger(path, run, stranger, error)
       if (allocated(stranger)) call raise(error, io_error, path//' '//stranger)
    end subroutine read_progress
 
    !> Find the last frame in closed segments. With changed settings, the run removes segments after the checkpoint, and
-   !> always those after its end, which an attempt with a longer duration has left.
-   subroutine count_segments(folder, manifest, is_changed, last_step, earlier, error)
+   !> always those after its end, which a start with a longer duration has left.
+   subroutine count_segments(folder, manifest, is_changed, last_step, previous, error)
       character(len=*), intent(in) :: folder
       type(manifest_t), intent(in) :: manifest
       logical, intent(in) :: is_changed
       !> Last step of the run
       integer(lp), intent(in) :: last_step
-      type(restart_state_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: previous
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, problem
       integer, allocatable :: places(:)
       integer(lp) :: steps(2)
 
       call find_segments(manifest, folder, places, problem)
-      earlier%segments = size(places, kind=ip)
-      call find_unlisted(folder, manifest, places, earlier, error)
+      previous%segments = size(places, kind=ip)
+      call find_unlisted(folder, manifest, places, previous, error)
       if (allocated(error)) return
-      if (int(earlier%segments, lp) < earlier%segments_at_checkpoint) then
-         call raise(error, io_error, segment_path(folder, earlier%segments + 1_ip)//' is missing, but it existed '// &
-                    'at the checkpoint of step '//to_text(earlier%step)//'. Put the file back, or start the run '// &
+      if (int(previous%segments, lp) < previous%segments_at_checkpoint) then
+         call raise(error, io_error, segment_path(folder, previous%segments + 1_ip)//' is missing, but it existed '// &
+                    'at the checkpoint of step '//to_text(previous%step)//'. Put the file back, or start the run '// &
                     'again with --force instead of --continue')
       end if
-      do while (earlier%segments > 0_ip .and. .not. allocated(error))
-         path = segment_path(folder, earlier%segments)
-         steps = earlier%unlisted(2:)
-         if (earlier%segments <= size(places)) steps = manifest%entry(places(earlier%segments))%frames(2:)
-         earlier%last_frame = steps(2)
-         if (earlier%last_frame <= merge(earlier%step, last_step, is_changed)) return
-         if (steps(1) <= earlier%step) then
-            call raise(error, input_error, path//' holds frames before and after step '//to_text(earlier%step)// &
+      do while (previous%segments > 0_ip .and. .not. allocated(error))
+         path = segment_path(folder, previous%segments)
+         steps = previous%unlisted(2:)
+         if (previous%segments <= size(places)) steps = manifest%entry(places(previous%segments))%frames(2:)
+         previous%last_frame = steps(2)
+         if (previous%last_frame <= merge(previous%step, last_step, is_changed)) return
+         if (steps(1) <= previous%step) then
+            call raise(error, input_error, path//' holds frames before and after step '//to_text(previous%step)// &
                        ', at which the settings would change. Resume with the old settings until '// &
-                       'after step '//to_text(earlier%last_frame))
+                       'after step '//to_text(previous%last_frame))
          else
-            earlier%surplus = earlier%surplus + 1_ip
-            earlier%remark = earlier%remark//new_line('a')//'to remove  '//path// &
+            previous%surplus = previous%surplus + 1_ip
+            previous%note = previous%note//new_line('a')//'to remove  '//path// &
                ', whose frames belong to other settings'
          end if
-         earlier%segments = earlier%segments - 1_ip
-         earlier%last_frame = -1_lp
+         previous%segments = previous%segments - 1_ip
+         previous%last_frame = -1_lp
       end do
    end subroutine count_segments
 
    !> Find a segment that has its final name but is not closed in the manifest, because a kill came in between. A
    !> segment gets its final name only when it is complete.
-   subroutine find_unlisted(folder, manifest, places, earlier, error)
+   subroutine find_unlisted(folder, manifest, places, previous, error)
       character(len=*), intent(in) :: folder
       type(manifest_t), intent(in) :: manifest
       integer, intent(in) :: places(:)
-      type(restart_state_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: previous
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, problem
       integer(lp) :: last
 
-      path = segment_path(folder, earlier%segments + 1_ip)
+      path = segment_path(folder, previous%segments + 1_ip)
       if (.not. manifest%owns(name_in(path))) return
       if (.not. exists(path, error)) return
-      call read_frames(path, earlier%unlisted, error)
+      call read_frames(path, previous%unlisted, error)
       if (allocated(error)) return
       call find_stranger(path, manifest%run, problem, error)
       last = -1_lp
       if (size(places) > 0) last = manifest%entry(places(size(places)))%frames(3)
-      if (earlier%unlisted(2) <= last .and. .not. allocated(problem)) &
+      if (previous%unlisted(2) <= last .and. .not. allocated(problem)) &
          problem = 'does not follow the previous segment, which ends at step '//to_text(last)
       if (allocated(problem)) call raise(error, io_error, path//' '//problem//'. Move the file away; the run '// &
          'writes its frames again')
-      earlier%segments = earlier%segments + 1_ip
+      previous%segments = previous%segments + 1_ip
    end subroutine find_unlisted
 
-   !> Remove the files of earlier attempts that the run does not keep: unfinished files, the profile of an ended run,
+   !> Remove the files of previous starts that the run does not keep: unfinished files, the profile of an ended run,
    !> and segments of earlier settings. Call this only after all checks of the restart have passed.
-   subroutine remove_surplus_files(folder, manifest, earlier, error)
+   subroutine remove_surplus_files(folder, manifest, previous, error)
       !> Result folder
       character(len=*), intent(in) :: folder
       !> Manifest of the folder, which is updated
       type(manifest_t), intent(inout) :: manifest
-      !> State of the folder after earlier attempts
-      type(restart_state_t), intent(in) :: earlier
+      !> State of the folder after previous starts
+      type(restart_state_t), intent(in) :: previous
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number
       integer :: k
 
       call manifest%remove_file(folder//'/'//profile_name, error)
       call manifest%remove_unfinished(error)
-      do number = earlier%segments + earlier%surplus, earlier%segments + 1_ip, -1_ip
+      do number = previous%segments + previous%surplus, previous%segments + 1_ip, -1_ip
          call manifest%remove_file(segment_path(folder, number), error)
          call manifest%remove_entry(segment_path(folder, number), error)
       end do
-      if (earlier%unlisted(1) > 0_lp .and. earlier%surplus == 0_ip) &
-         call manifest%close_file(segment_path(folder, earlier%segments), error, earlier%unlisted)
+      if (previous%unlisted(1) > 0_lp .and. previous%surplus == 0_ip) &
+         call manifest%close_file(segment_path(folder, previous%segments), error, previous%unlisted)
       k = manifest%place_of(trace_name)
       if (k == 0) return
       if (.not. manifest%entry(k)%is_closed) call manifest%close_file(folder//'/'//trace_name, error)
    end subroutine remove_surplus_files
 
-   !> Serialize what all ranks must know of the earlier attempts.
-   subroutine serialize_earlier(serializer, earlier)
+   !> Serialize what all ranks must know of the previous starts.
+   subroutine serialize_previous(serializer, previous)
       class(serializer_t), intent(inout) :: serializer
-      !> State of the folder after earlier attempts
-      type(restart_state_t), intent(inout) :: earlier
+      !> State of the folder after previous starts
+      type(restart_state_t), intent(inout) :: previous
       integer(ip) :: numbers(2)
 
-      numbers = [earlier%checkpoint, earlier%segments]
+      numbers = [previous%checkpoint, previous%segments]
       call serializer%field('/run/files', numbers, '1', 'number of the checkpoint, number of segments')
-      earlier%checkpoint = numbers(1)
-      earlier%segments = numbers(2)
-      call serializer%field('/run/step', earlier%step, '1', 'step of the checkpoint')
-      call serializer%field('/run/last_frame', earlier%last_frame, '1', 'step of the last frame')
-   end subroutine serialize_earlier
+      previous%checkpoint = numbers(1)
+      previous%segments = numbers(2)
+      call serializer%field('/run/step', previous%step, '1', 'step of the checkpoint')
+      call serializer%field('/run/last_frame', previous%last_frame, '1', 'step of the last frame')
+   end subroutine serialize_previous
 
    !> Restore the simulation from the checkpoint. Collective; all ranks get the same error.
-   subroutine restore(folder, earlier, revision, simulation, attempts, monitor, log, error)
+   subroutine restore(folder, previous, revision, simulation, restarts, log, error)
       !> Result folder
       character(len=*), intent(in) :: folder
       !> State of the folder, with a checkpoint
-      type(restart_state_t), intent(in) :: earlier
+      type(restart_state_t), intent(in) :: previous
       !> Commit of this program
       character(len=*), intent(in) :: revision
       !> A simulation of the same scene at time 0
       type(simulation_t), intent(inout) :: simulation
-      !> On entry the scene hash, on return all attempts including this one
-      type(attempts_t), intent(inout) :: attempts
+      !> On entry the scene hash, on return all restarts including this one
+      type(restarts_t), intent(inout) :: restarts
       !> Monitor at time 0
-      type(monitor_t), intent(inout) :: monitor
       type(log_t), intent(inout) :: log
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
 
-      call file%open(checkpoint_path(folder, earlier%checkpoint), error, simulation%comm)
+      call file%open(checkpoint_path(folder, previous%checkpoint), error, simulation%comm)
       if (allocated(error)) return
-      call serialize_run(file, simulation, attempts, monitor)
+      call serialize_run(file, simulation, restarts)
       call file%close(error)
       if (allocated(error)) then
          if (error%is_unread) return
-         error%message = checkpoint_path(folder, earlier%checkpoint)//' does not fit this run: '//error%message
+         error%message = checkpoint_path(folder, previous%checkpoint)//' does not fit this run: '//error%message
          if (index(error%message, '/run/time_step') > 0) error%message = error%message// &
             '. Set dt in &integrate to the saved value, or omit it'
          return
       end if
-      if (earlier%is_changed) call check_places(simulation, error)
+      if (previous%is_changed) call check_places(simulation, error)
       if (allocated(error)) return
       ! The first step distributes the bodies again. The sums over all ranks continue on the root rank.
       associate (s => simulation, median_diameter => simulation%domain%median_diameter)
          call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, s%bodies%cell)
          if (.not. s%comm%is_root()) then
             s%sums = 0_lp
-            call s%walls%record%clear()
+            call clear_record(s%walls)
             s%timers = timers_t()
             s%search%neighbours%finder%work%value = 0_lp
             s%search%neighbours%finder%work%seconds = 0.0_dp
          end if
       end associate
       ! Segments behind the checkpoint have some of its rows.
-      call simulation%series%drop_rows(earlier%last_frame)
-      attempts%attempts = attempts%attempts + 1_lp
-      call log%write_line('attempt    '//to_text(attempts%attempts))
-      if (revision /= earlier%revision) call log%write_line('warning: another revision of this program ('// &
-         earlier%revision//') wrote the checkpoint; results may differ from those of an uninterrupted run')
+      call simulation%series%drop_rows(previous%last_frame)
+      restarts%number = restarts%number + 1_lp
+      call log%write_line('restart    '//to_text(restarts%number))
+      if (revision /= previous%revision) call log%write_line('warning: another revision of this program ('// &
+         previous%revision//') wrote the checkpoint; results may differ from those of an uninterrupted run')
    end subroutine restore
 
 end module polydem_restart

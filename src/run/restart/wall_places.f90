@@ -27,13 +27,14 @@ contains
       integer(ip) :: j
       integer :: k
 
-      if (size(simulation%walls%driven) == 0) return
+      if (.not. simulation%walls%any_driven()) return
       moved = simulation%bodies
       call simulation%walls%move(time_of(simulation), moved)
       associate (bodies => simulation%bodies)
-         do k = 1, size(simulation%walls%driven)
-            do j = 1_ip, size(simulation%walls%driven(k)%slots, kind=ip)
-               associate (s => simulation%walls%driven(k)%slots(j))
+         do k = 1, size(simulation%walls%wall)
+            if (.not. simulation%walls%wall(k)%is_driven()) cycle
+            do j = 1_ip, size(simulation%walls%wall(k)%slots, kind=ip)
+               associate (s => simulation%walls%wall(k)%slots(j))
                   offset = nearest_copy(bodies%cell, bodies%cell%inverse, moved%position(:, s) - bodies%position(:, s))
                   way = hypotenuse(offset(1), offset(2)) + abs(moved%angle(s) - bodies%angle(s))*bodies%diameter(s)
                   if (way <= most_way*bodies%diameter(s)) cycle

@@ -73,7 +73,7 @@ contains
       !> First file that cannot be read, which is not counted as wrong
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: failure
-      character(len=:), allocatable :: name, problem, remark
+      character(len=:), allocatable :: name, problem, note
       integer(ip) :: k
 
       name = trim(entry%name)
@@ -81,14 +81,14 @@ contains
       if (entry%is_closed) then
          call find_problem(folder, entry, problem, failure)
          if (allocated(problem) .and. is_table(name)) problem = problem//'; --continue makes it again'
-         remark = to_text(entry%bytes)//' bytes'
-         if (segment_number(name) > 0_ip) remark = remark//', '//counted(entry%frames(1), 'frame')//', steps '// &
+         note = to_text(entry%bytes)//' bytes'
+         if (segment_number(name) > 0_ip) note = note//', '//counted(entry%frames(1), 'frame')//', steps '// &
             to_text(entry%frames(2))//' to '//to_text(entry%frames(3))
          call report_entry()
          return
       end if
       if (.not. link_exists(folder//'/'//name, error)) return
-      remark = 'present, has no checksum'
+      note = 'present, has no checksum'
       if (gets_closed(name)) problem = 'has no checksum: the run was killed before it recorded one, or is about '// &
          'to record it; --continue repairs this'
       do k = 1_ip, n_checkpoints
@@ -96,7 +96,7 @@ contains
          call verify_checksum(folder//'/'//name, problem, failure)
          if (.not. (allocated(problem) .or. allocated(failure))) &
             call find_stranger(folder//'/'//name, run, problem, failure)
-         remark = 'its checksum is correct'
+         note = 'its checksum is correct'
       end do
       call report_entry()
 
@@ -104,7 +104,7 @@ contains
 
       subroutine report_entry()
          if (.not. allocated(failure)) then
-            call report_file(findings, name, problem, remark)
+            call report_file(findings, name, problem, note)
          else if (.not. allocated(error)) then
             call move_alloc(failure, error)
          end if
@@ -169,20 +169,20 @@ contains
    end function gets_closed
 
    !> Count a file and write its line.
-   subroutine report_file(findings, name, problem, remark)
+   subroutine report_file(findings, name, problem, note)
       type(findings_t), intent(inout) :: findings
       character(len=*), intent(in) :: name
       !> Problem with the file; unallocated if there is none
       character(len=:), allocatable, intent(in) :: problem
-      !> Remark on a file without a problem
-      character(len=*), intent(in) :: remark
+      !> Note on a file without a problem
+      character(len=*), intent(in) :: note
 
       findings%n_files = findings%n_files + 1_ip
       if (allocated(problem)) then
          findings%n_wrong = findings%n_wrong + 1_ip
          call findings%log%write_line('WRONG  '//name//'  '//problem)
       else
-         call findings%log%write_line('ok     '//name//'  '//remark)
+         call findings%log%write_line('ok     '//name//'  '//note)
       end if
    end subroutine report_file
 

@@ -16,7 +16,7 @@ module polydem_claim_folder
 
 contains
 
-   !> Begin the manifest of a run, or continue that of earlier attempts. The folder of a result to be replaced is
+   !> Begin the manifest of a run, or continue that of previous starts. The folder of a result to be replaced is
    !> renamed.
    subroutine claim_folder(settings, has_deep_contacts, folder, force, is_restart, shares, lock, note, manifest, error)
       type(settings_t), intent(in) :: settings
@@ -26,7 +26,7 @@ contains
       character(len=*), intent(in) :: folder
       !> Whether the run replaces an existing result
       logical, intent(in) :: force
-      !> Whether the run keeps the files of earlier attempts
+      !> Whether the run keeps the files of previous starts
       logical, intent(in) :: is_restart
       !> Whether other ranks of the run share the lock
       logical, intent(in) :: shares

@@ -12,11 +12,11 @@ module polydem_finished_result
    use polydem_manifest, only: manifest_t
    use polydem_profile_file, only: read_final_status
    use polydem_provenance, only: origin_of
-   use polydem_prepare, only: write_overlaps
+   use polydem_open_log, only: write_overlaps
    use polydem_result_files, only: name_in, overlaps_name, profile_name, series_name
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
-   use polydem_begin_run, only: build_start
+   use polydem_start, only: build_start
    use polydem_series_row, only: collect_row
    implicit none
    private
@@ -32,7 +32,7 @@ contains
       integer :: k
 
       found = 0_lp
-      if (run%comm%is_root() .and. run%attempt%continues) then
+      if (run%comm%is_root() .and. run%options%continues) then
          call run%manifest%read(run%folder)
          k = run%manifest%place_of(profile_name)
          if (k > 0 .and. .not. allocated(run%manifest%problem)) &

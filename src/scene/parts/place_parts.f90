@@ -22,7 +22,7 @@ module polydem_place_parts
    use polydem_start_velocities, only: choose_moving_grains, draw_spins, draw_velocities, remove_momentum, set_speed
    use polydem_strings, only: quoted, to_text
    use polydem_voronoi, only: cut_blocks
-   use polydem_wall_bodies, only: wall_bodies_t
+   use polydem_wall, only: wall_t
    use polydem_wall_outlines, only: outline_wall, problem_t
    implicit none
    private
@@ -46,7 +46,7 @@ contains
       type(polygon_list_t), intent(in) :: others
       type(body_list_t), intent(inout) :: list
       !> The walls with their bodies
-      type(wall_bodies_t), allocatable, intent(out) :: walls(:)
+      type(wall_t), allocatable, intent(out) :: walls(:)
       !> First part that is wrong; the message begins with its place if it is a part of the namelist
       type(error_t), allocatable, intent(inout) :: error
       type(polygon_list_t) :: outlines, placed

@@ -92,7 +92,7 @@ contains
                        to_text(widest, 3)//' m long; make the rectangle at least as wide and as high')
             return
          end if
-         if (size(self%walls%driven) > 0 .or. self%walls%named%has_gates()) return
+         if (self%walls%any_driven() .or. self%walls%has_gates()) return
          has_room = .false.
          do k = 1, size(candidates)
             do j = 1, size(candidates(k)%place, 2)

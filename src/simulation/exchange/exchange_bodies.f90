@@ -50,7 +50,7 @@ contains
       call list_entries(self, size(departing%id, kind=lp), kept, list, origin)
       if (size(departing%id) > 0) then
          if (self%settings%output%energy_balance) then
-            call take_leaving(self%energy_balance, self%dt, self%settings%forces%gravity, &
+            call take_leaving(self%energy_balance, self%dt, self%forces%gravity, &
                               self%traffic%leaving(:n_totals))
             call release_energy(self%energy_balance, self%traffic%leaving(n_totals + 1))
          end if
@@ -63,7 +63,7 @@ contains
       if (allocated(error)) return
       call count_masses(self%comm, added, origin, self%traffic%sources)
       if (self%settings%output%energy_balance) call count_entering(self%energy_balance, self%comm, self%dt, &
-         self%settings%forces%gravity, added)
+         self%forces%gravity, added)
       call replace_bodies(self, kept, added, error)
    end subroutine exchange_bodies
 
@@ -106,13 +106,13 @@ contains
       if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
       call list_departures(self, departing, kept)
       if (size(departing%id) == 0) return
-      call find_leaving_totals(self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, &
+      call find_leaving_totals(self%energy_balance, self%comm, self%forces%gravity, self%bodies, &
                                self%loop%force_sums, self%loop%walls, .not. kept, total)
       associate (contacts => self%contacts, bodies => self%bodies)
          if (self%loop%walls%energy_is_known) then
             do c = 1_ip, contacts%n
-               if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
-               if (stays(contacts%first(c)) .and. stays(contacts%second(c))) cycle
+               if (.not. owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) cycle
+               if (stays(contacts%row(c)%first) .and. stays(contacts%row(c)%second)) cycle
                call released(1)%add(energy_of_contact(contacts, c))
             end do
          end if

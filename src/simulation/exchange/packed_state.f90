@@ -9,10 +9,9 @@ module polydem_packed_state
    use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, join_packed, pack_bodies, unpack_bodies
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_wall, only: find_slots, wall_t
    implicit none
    private
-   public :: packed_state_t, pack_state, send_state, join_state, unpack_state, find_walls
+   public :: packed_state_t, pack_state, send_state, join_state, unpack_state
 
    !> Packed bodies with their state
    type :: packed_state_t
@@ -74,28 +73,13 @@ contains
       type(packed_state_t), intent(inout) :: packed
       !> Slot of each packed body
       integer(ip), allocatable, intent(out) :: slots(:)
-      integer(ip), allocatable :: former(:)
 
-      former = self%bodies%id
       call unpack_bodies(packed%bodies, self%bodies, slots)
-      call find_walls(former, self%bodies%id, self%walls%driven)
+      call self%walls%find_slots(self%bodies)
       call packed%columns%restore_to(slots(:packed%columns%n_rows))
       call self%motion%integrator%start(self%bodies)
       call serialize_columns(packed%columns, self)
    end subroutine unpack_state
-
-   !> Find the bodies of all walls again after bodies have changed their slots.
-   subroutine find_walls(former, id, walls)
-      !> Identifier of the body of each former slot, and of each slot now
-      integer(ip), intent(in) :: former(:), id(:)
-      !> The walls; their slots change
-      type(wall_t), intent(inout) :: walls(:)
-      integer :: k
-
-      do k = 1, size(walls)
-         call find_slots(walls(k), former, id)
-      end do
-   end subroutine find_walls
 
    !> Serialize the state of the bodies, including data of the current step.
    subroutine serialize_columns(serializer, self)

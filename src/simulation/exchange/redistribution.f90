@@ -12,7 +12,7 @@ module polydem_redistribution
    use polydem_contact_history, only: contact_history_t
    use polydem_domain, only: domain_t
    use polydem_errors, only: error_t
-   use polydem_motion_check, only: greatest_displacement
+   use polydem_motion_tests, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_data, only: rebuild_local_data

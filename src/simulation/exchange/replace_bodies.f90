@@ -16,8 +16,9 @@ module polydem_replace_bodies
    use polydem_errors, only: error_t, raise, run_error
    use polydem_field_sums, only: accelerate_by_fields
    use polydem_force_sums, only: begin_sums, force_sums_t, total_forces
+   use polydem_guard, only: set_global_limits
    use polydem_kinds, only: ip, lp
-   use polydem_local_data, only: limit_displacement, rebuild_local_data
+   use polydem_local_data, only: rebuild_local_data
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_ownership, only: owns_body
    use polydem_packed_bodies, only: join_packed, pack_bodies, packed_bodies_t
@@ -101,7 +102,7 @@ contains
 
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
       call rebuild_local_data(self, error, self%domain%median_diameter)
-      call limit_displacement(self%settings%guards, self%bodies, self%comm, self%motion%check)
+      call set_global_limits(self)
       call self%domain%forget_halo()
       call self%comm%all_reduce_error(error)
    end subroutine rebuild_bodies
@@ -161,7 +162,7 @@ contains
       type(energy_balance_t), intent(out) :: entering
       type(force_sums_t) :: sums
 
-      associate (gravity => self%settings%forces%gravity)
+      associate (gravity => self%forces%gravity)
          call begin_sums(added%n, sums)
          call self%body_forces%apply(gravity, time_of(self), added, sums)
          call total_forces(gravity, sums, added)

@@ -86,8 +86,8 @@ contains
       meets_fixed = .true.
       do s = 1_ip, bodies%n
          if (.not. bodies%fixed(s)) cycle
-         if (allocated(bodies%gone)) then
-            if (bodies%gone(s)) cycle
+         if (allocated(bodies%removed)) then
+            if (bodies%removed(s)) cycle
          end if
          offset = centre - bodies%position(:, s)
          folds = 0.0_wp

@@ -13,11 +13,11 @@ module polydem_energy_guard
    use polydem_errors, only: error_t
    use polydem_force_sums, only: energy_of_contact
    use polydem_global_reductions, only: sum_exactly
-   use polydem_guard, only: guard_t
+   use polydem_guard, only: shorter_step
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_motion_check, only: shorter_step
    use polydem_ownership, only: owns_pair
-   use polydem_simulation, only: simulation_t, compute_balance
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: guard_t, simulation_t, compute_balance
    use polydem_strings, only: to_text
    implicit none
    private
@@ -28,23 +28,30 @@ module polydem_energy_guard
       !> Elastic energy of the contacts at the start [J/m]
       real(wp) :: stored = 0.0_wp
    contains
+      procedure :: configure
       procedure :: start
       procedure :: look
    end type energy_guard_t
 
 contains
 
-   !> Set what the guard says of itself, and record the elastic energy of the contacts. Collective.
+   !> Set what the guard says of itself.
+   subroutine configure(self, settings)
+      class(energy_guard_t), intent(inout) :: self
+      type(settings_t), intent(in) :: settings
+
+      self%noun = 'check'
+      self%finding = 'that found an unexplained energy gain'
+      self%choice = settings%guards%energy
+      self%is_global = .true.
+   end subroutine configure
+
+   !> Record the elastic energy of the contacts.
    subroutine start(self, simulation)
       class(energy_guard_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
 
-      self%noun = 'check'
-      self%finding = 'that found an unexplained energy gain'
-      self%choice = simulation%settings%guards%energy
-      self%is_global = .true.
-      if (self%choice /= 'off') call find_stored_energy( &
-         simulation%comm, simulation%bodies, simulation%contacts, self%stored)
+      if (self%is_on) call find_stored_energy(simulation%comm, simulation%bodies, simulation%contacts, self%stored)
    end subroutine start
 
    !> Find the elastic energy of the contacts of all ranks, with that of cohesion. Collective.
@@ -60,7 +67,7 @@ contains
 
       allocate (terms(contacts%n), source=0.0_wp)
       do c = 1_ip, contacts%n
-         if (owns_pair(bodies, contacts%first(c), contacts%second(c))) &
+         if (owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) &
             terms(c) = energy_of_contact(contacts, c)
       end do
       call sum_exactly(comm, terms, stored)

@@ -2,26 +2,22 @@
 module polydem_guard_list
    use polydem_displacement_guard, only: displacement_guard_t
    use polydem_energy_guard, only: energy_guard_t
-   use polydem_guard, only: guard_t
    use polydem_overlap_guard, only: overlap_guard_t
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: guard_item_t, guard_t
    use polydem_step_guard, only: step_guard_t
    use polydem_tunnelling_guard, only: tunnelling_guard_t
    implicit none
    private
-   public :: listed_guard_t, list_guards
-
-   !> A guard of any kind
-   type :: listed_guard_t
-      !> The guard
-      class(guard_t), allocatable :: guard
-   end type listed_guard_t
+   public :: choose_guards
 
 contains
 
-   !> List all guards, also those that are off.
-   subroutine list_guards(list)
+   !> List all guards as the settings say, also those that are off.
+   subroutine choose_guards(settings, list)
+      type(settings_t), intent(in) :: settings
       !> The guards in the order of their checks
-      type(listed_guard_t), allocatable, intent(out) :: list(:)
+      type(guard_item_t), allocatable, intent(out) :: list(:)
 
       allocate (list(0))
       call add('displacement', displacement_guard_t())
@@ -36,7 +32,7 @@ contains
       subroutine add(name, guard)
          character(len=*), intent(in) :: name
          class(guard_t), intent(in) :: guard
-         type(listed_guard_t), allocatable :: longer(:)
+         type(guard_item_t), allocatable :: longer(:)
          integer :: k
 
          allocate (longer(size(list) + 1))
@@ -44,10 +40,14 @@ contains
             call move_alloc(list(k)%guard, longer(k)%guard)
          end do
          allocate (longer(size(longer))%guard, source=guard)
-         longer(size(longer))%guard%name = name
+         associate (new => longer(size(longer))%guard)
+            new%name = name
+            call new%configure(settings)
+            new%is_on = new%choice /= 'off'
+         end associate
          call move_alloc(longer, list)
       end subroutine add
 
-   end subroutine list_guards
+   end subroutine choose_guards
 
 end module polydem_guard_list

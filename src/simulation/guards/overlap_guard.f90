@@ -1,11 +1,12 @@
 !> Guard of contacts that are deep relative to their bodies.
 module polydem_overlap_guard
+   use polydem_contact_flags, only: flag_deeper
    use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text, thinner_pieces
    use polydem_errors, only: error_t
-   use polydem_guard, only: guard_t
+   use polydem_guard, only: shorter_step
    use polydem_kinds, only: dp, ip, wp
-   use polydem_motion_check, only: shorter_step
-   use polydem_simulation, only: simulation_t
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: guard_t, simulation_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -14,21 +15,31 @@ module polydem_overlap_guard
    !> Guard of the depth of contacts
    type, extends(guard_t) :: overlap_guard_t
    contains
-      procedure :: start
+      procedure :: configure
+      procedure :: set_local_limits
       procedure :: look
    end type overlap_guard_t
 
 contains
 
    !> Set what the guard says of itself.
-   subroutine start(self, simulation)
+   subroutine configure(self, settings)
       class(overlap_guard_t), intent(inout) :: self
-      type(simulation_t), intent(inout) :: simulation
+      type(settings_t), intent(in) :: settings
 
       self%noun = 'step'
       self%finding = 'with a contact that was too deep'
-      self%choice = simulation%settings%guards%overlap
-   end subroutine start
+      self%choice = settings%guards%overlap
+   end subroutine configure
+
+   !> Flag contacts that are too deep.
+   subroutine set_local_limits(self, simulation)
+      class(overlap_guard_t), intent(in) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      if (self%is_on) call flag_deeper(simulation%loop%flag_limits, simulation%settings%guards%overlap_limit, &
+                                       simulation%bodies)
+   end subroutine set_local_limits
 
    !> Respond to the deepest contact. The rank with the deepest contact of all ranks reports it, at once if it stops the
    !> run.

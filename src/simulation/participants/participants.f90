@@ -8,15 +8,12 @@ module polydem_participants
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_item_t, participant_t, simulation_t
    use polydem_sources_and_sinks, only: sources_and_sinks_t
-   use polydem_vanishing_walls, only: vanishing_walls_t
+   use polydem_undirected_contacts, only: undirected_contacts_t
+   use polydem_wall_removal, only: wall_removal_t
    implicit none
    private
-   public :: choose_participants, start_participants, change_bodies, begin_step, need_table, need_all_ranks, &
-      follow_forces, end_step, serialize_participants
-
-   !> The stop at contacts without direction: a rank that finds one stops all of them
-   type, extends(participant_t) :: agreement_t
-   end type agreement_t
+   public :: choose_participants, start_participants, change_bodies, begin_step, need_table, check_contacts, &
+      need_all_ranks, follow_forces, end_step, serialize_participants
 
 contains
 
@@ -27,13 +24,13 @@ contains
       type(participant_item_t), allocatable :: list(:)
 
       allocate (list(0))
-      if (self%walls%named%has_gates()) call add(vanishing_walls_t())
+      if (self%walls%has_gates()) call add(wall_removal_t())
       if (allocated(self%traffic)) call add(sources_and_sinks_t())
       if (self%bodies%cell%is_sheared .or. allocated(self%bodies%cell%load)) &
          call add(moving_cell_t(needs_all_ranks=allocated(self%bodies%cell%load)))
       if (allocated(self%walls%loads)) call add(loaded_walls_t(needs_all_ranks=.true.))
       if (self%settings%output%series_interval > 0.0_wp) call add(recorded_walls_t())
-      if (self%settings%overlap%degenerate == 'stop') call add(agreement_t(needs_all_ranks=.true.))
+      if (self%settings%overlap%degenerate == 'stop') call add(undirected_contacts_t(needs_all_ranks=.true.))
       call move_alloc(list, self%participants)
 
    contains
@@ -67,7 +64,7 @@ contains
       call move_alloc(list, self%participants)
    end subroutine start_participants
 
-   !> Let bodies enter, leave or vanish between two steps. Collective; all ranks get the same error.
+   !> Let bodies enter or leave between two steps. Collective; all ranks get the same error.
    subroutine change_bodies(self, error)
       type(simulation_t), intent(inout) :: self
       !> Allocated if one of them fails
@@ -107,6 +104,19 @@ contains
          need_table = need_table .or. self%participants(k)%participant%needs_table(self)
       end do
    end function need_table
+
+   !> Stop the run if the contacts of a step are none to go on with. An error of one rank reaches all ranks if
+   !> `need_all_ranks`.
+   subroutine check_contacts(self, error)
+      type(simulation_t), intent(in) :: self
+      !> Names the contact; on entry an error of the step, after which nothing is done
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      do k = 1, size(self%participants)
+         if (.not. allocated(error)) call self%participants(k)%participant%check_contacts(self, error)
+      end do
+   end subroutine check_contacts
 
    !> Whether all ranks must agree on errors before the participants act on the forces
    pure logical function need_all_ranks(self)

@@ -2,11 +2,12 @@
 module polydem_recorded_walls
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_t, simulation_t
+   use polydem_wall_record, only: add_step, serialize_record, start_record
    implicit none
    private
    public :: recorded_walls_t
 
-   !> The record; its state is `walls%record` of the simulation
+   !> The record; its state is `walls%sums` of the simulation
    type, extends(participant_t) :: recorded_walls_t
    contains
       procedure :: start
@@ -21,9 +22,9 @@ contains
       class(recorded_walls_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
 
-      associate (unused => self, walls => simulation%walls)
-         call walls%record%start(walls%named, simulation%bodies, simulation%loop%walls)
+      associate (unused => self)
       end associate
+      call start_record(simulation%walls, simulation%bodies, simulation%loop%walls)
    end subroutine start
 
    !> Add a step.
@@ -33,7 +34,7 @@ contains
 
       associate (unused => self)
       end associate
-      call simulation%walls%accumulate(simulation%bodies, simulation%loop%walls)
+      call add_step(simulation%walls, simulation%bodies, simulation%loop%walls)
    end subroutine end_step
 
    !> Serialize the record, and the rows of the series that no file has yet.
@@ -44,7 +45,7 @@ contains
 
       associate (unused => self)
       end associate
-      call simulation%walls%record%serialize(serializer)
+      call serialize_record(simulation%walls, serializer)
       call simulation%series%serialize(serializer)
    end subroutine serialize
 

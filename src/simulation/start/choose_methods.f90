@@ -2,8 +2,9 @@
 module polydem_choose_methods
    use polydem_body_forces, only: body_forces_t, choose_body_forces
    use polydem_errors, only: error_t
+   use polydem_guard_list, only: choose_guards
    use polydem_integrator_factory, only: new_integrator
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: ip
    use polydem_law_factory, only: choose_parts
    use polydem_new_neighbours, only: choose_finder
    use polydem_pair_parameters, only: pair_parameters
@@ -17,7 +18,8 @@ module polydem_choose_methods
 
 contains
 
-   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks, participants.
+   !> Choose what the settings name: force law, integrator, finder, forces on bodies, sources and sinks, participants,
+   !> guards.
    subroutine choose_methods(self, error)
       !> The simulation with its settings, and with the parameters of its first stage
       type(simulation_t), intent(inout) :: self
@@ -25,7 +27,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       associate (settings => self%settings)
-         call choose_parts(settings%forces, self%law, pair_parameters(settings))
+         call choose_parts(self%forces, self%law, pair_parameters(settings, self%forces))
          call self%law%check(settings, 1_ip, error)
          if (allocated(error)) return
          call new_traffic(settings, self%traffic, error)
@@ -33,25 +35,26 @@ contains
          call new_integrator(settings%integrate, self%motion%integrator)
          call choose_finder(self%search%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, &
                             self%bodies%isa)
-         call choose_all_fields(settings, self%stages%drag, self%body_forces)
+         call choose_all_fields(settings, self%forces, self%body_forces)
       end associate
       call choose_participants(self)
+      call choose_guards(self%settings, self%guards)
    end subroutine choose_methods
 
    !> Choose the forces that are no contacts: those of any stage, with the parameters of the strongest.
-   subroutine choose_all_fields(settings, drag, body_forces)
+   subroutine choose_all_fields(settings, forces, body_forces)
       type(settings_t), intent(in) :: settings
-      !> Drag of the group &forces [1/s]
-      real(wp), intent(in) :: drag
+      !> Parameters of the forces in the first stage
+      type(forces_settings_t), intent(in) :: forces
       type(body_forces_t), intent(out) :: body_forces
-      type(forces_settings_t) :: forces
+      type(forces_settings_t) :: strongest
       integer :: k
 
-      forces = settings%forces
+      strongest = forces
       do k = 1, size(settings%stage)
-         forces%drag = max(forces%drag, drag + settings%stage(k)%drag)
+         strongest%drag = max(strongest%drag, settings%forces%drag + settings%stage(k)%drag)
       end do
-      call choose_body_forces(forces, body_forces)
+      call choose_body_forces(strongest, body_forces)
    end subroutine choose_all_fields
 
 end module polydem_choose_methods

@@ -104,7 +104,7 @@ contains
          largest = 0.0_wp
          if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
          call reduce_to_greatest(self%comm, largest)
-         call set_cell_mass(usual, self%settings%forces%stiffness, largest(1), bodies%cell%load)
+         call set_cell_mass(usual, self%forces%stiffness, largest(1), bodies%cell%load)
       end associate
    end subroutine set_controlled_masses
 
@@ -131,7 +131,7 @@ contains
 
       if (allocated(error) .or. .not. allocated(self%bodies%cell%load)) return
       associate (cell => self%bodies%cell)
-         least = (least_steps*self%dt)**2*self%settings%forces%stiffness*maxval(cell%size)/minval(cell%size)
+         least = (least_steps*self%dt)**2*self%forces%stiffness*maxval(cell%size)/minval(cell%size)
          if (cell%load%axis(1)%mass >= least) return
          call raise(error, input_error, place_of(self%settings, 'cell', 'mass')//': ''mass'' in &cell: the size '// &
                     'of a cell of '//to_text(cell%load%axis(1)%mass)//' kg/m oscillates faster than the time step '// &
@@ -157,8 +157,8 @@ contains
          end associate
       end do
       associate (bodies => self%bodies, walls => self%walls)
-         call walls%named%find_slots(bodies)
-         call set_masses(walls%loads, walls%named, bodies, usual, self%settings%forces%stiffness)
+         call walls%find_slots(bodies)
+         call set_masses(walls%loads, walls%wall, bodies, usual, self%forces%stiffness)
       end associate
    end subroutine prepare_loads
 
@@ -219,7 +219,7 @@ contains
       character(len=:), allocatable :: key, place, remedy
 
       if (self%dt*self%body_forces%rate() <= greatest_change) return
-      associate (forces => self%settings%forces, rate => self%body_forces%rate())
+      associate (forces => self%forces, rate => self%body_forces%rate())
          key = 'drag'
          if (two_pi*abs(forces%turn_rate) >= rate) key = 'turn_rate'
          if (two_pi*forces%shake_frequency >= rate) key = 'shake_frequency'
@@ -260,13 +260,13 @@ contains
 
       greatest = 0.0_wp
       if (.not. allocated(self%walls%loads)) return
-      mobility = wall_mobilities(self%walls%loads, self%walls%named, self%bodies)
+      mobility = wall_mobilities(self%walls%loads, self%walls%wall, self%bodies)
       do k = 1, size(self%walls%loads)
-         associate (w => self%walls%loads(k)%wall)
-            extent(:, 1) = self%walls%named%extent(w, 1, self%bodies)
-            extent(:, 2) = self%walls%named%extent(w, 2, self%bodies)
-            if (size(self%walls%named%wall(w)%slots) > 0) greatest = max(greatest, &
-               mobility(self%walls%named%wall(w)%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
+         associate (wall => self%walls%wall(self%walls%loads(k)%wall))
+            extent(:, 1) = wall%extent(1, self%bodies)
+            extent(:, 2) = wall%extent(2, self%bodies)
+            if (size(wall%slots) > 0) greatest = max(greatest, &
+               mobility(wall%slots(1))*[1.0_wp, maxval(extent(2, :) - extent(1, :))])
          end associate
       end do
    end function mobility_of_walls

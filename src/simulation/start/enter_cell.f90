@@ -7,11 +7,13 @@ module polydem_enter_cell
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
+   use polydem_motion, only: motion_limits_t
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: cell_settings_t, settings_t
    use polydem_simulation, only: simulation_t
    use polydem_source_locations, only: place_of
    use polydem_strings, only: to_text
+   use polydem_walls, only: walls_t
    implicit none
    private
    public :: enter_cell, join_copies, check_constraint
@@ -74,8 +76,8 @@ contains
          do s = 1_ip, bodies%n
             if (bodies%fixed(s)) bodies%image(s, :) = 0_ip
          end do
-         do s = 1_ip, size(self%walls%driven, kind=ip)
-            self%walls%driven(s)%position = bodies%position(:, self%walls%driven(s)%slots)
+         do s = 1_ip, size(self%walls%wall, kind=ip)
+            self%walls%wall(s)%position = bodies%position(:, self%walls%wall(s)%slots)
          end do
       end associate
    end subroutine enter_cell
@@ -133,7 +135,7 @@ contains
       if (allocated(self%bodies%cell%load) .and. allocated(self%law%constraint)) call raise(error, input_error, &
          place_of(self%settings, 'cell', 'stress_controlled')//': ''stress_controlled'' in &cell cannot be '// &
          'combined with this ''friction'' in &forces, which does not know how the cell grows; use cundall_strack')
-      if (self%settings%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
+      if (self%forces%local_damping > 0.0_wp .and. allocated(self%law%constraint)) call raise(error, &
          input_error, place_of(self%settings, 'forces', 'local_damping')//': ''local_damping'' in &forces cannot '// &
          'be combined with this ''friction'', whose forces depend on the motion without it; use drag')
    end subroutine check_constraint
@@ -218,16 +220,16 @@ contains
       integer(ip) :: k
       integer :: axis, w
 
-      do w = 1, size(self%walls%driven)
-         do k = 1_ip, size(self%walls%driven(w)%slots, kind=ip)
-            associate (s => self%walls%driven(w)%slots(k), bodies => self%bodies)
+      do w = 1, size(self%walls%wall)
+         do k = 1_ip, size(self%walls%wall(w)%slots, kind=ip)
+            associate (s => self%walls%wall(w)%slots(k), bodies => self%bodies)
                if (allocated(error)) return
-               if (moves(self, w, s, along_angle)) call refuse(self, s, 'turns, which its copies do not; leave out '// &
-                  'the angles of its table of motion, and loads along ''angle''', error)
+               if (moves(self%walls, w, along_angle)) call refuse(self, s, 'turns, which its copies do not; leave '// &
+                  'out the angles of its table of motion, and loads along ''angle''', error)
                do axis = 1, 2
                   if (allocated(error)) return
                   if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%folds(axis, s) > 0.0_wp) cycle
-                  if (moves(self, w, s, axis)) call refuse(self, s, 'spans the cell and cannot move along '// &
+                  if (moves(self%walls, w, axis)) call refuse(self, s, 'spans the cell and cannot move along '// &
                      name(axis)//'; use a conveyor, or make it of bodies that are shorter than half the cell, for '// &
                      'example with outline = ''row'' in &wall', error)
                end do
@@ -236,32 +238,22 @@ contains
       end do
    end subroutine check_walls
 
-   !> Whether a motion or a load moves a fixed body of a wall along a direction, 1, 2 or `along_angle`
-   pure logical function moves(self, w, s, direction)
-      type(simulation_t), intent(in) :: self
+   !> Whether a motion or a load moves a wall along a direction, 1, 2 or `along_angle`
+   pure logical function moves(walls, w, direction)
+      type(walls_t), intent(in) :: walls
       !> Number of the wall
       integer, intent(in) :: w
-      !> Slot of the body
-      integer(ip), intent(in) :: s
       integer, intent(in) :: direction
-      integer :: m
+      type(motion_limits_t) :: limits
+      integer :: k
 
-      moves = is_loaded(self, s, direction)
-      do m = 1, size(self%walls%driven(w)%motions)
-         moves = moves .or. self%walls%driven(w)%motions(m)%motion%moves(direction)
+      moves = .false.
+      if (allocated(walls%loads)) moves = any(walls%loads(walls%wall(w)%loads)%direction == direction)
+      do k = 1, size(walls%wall(w)%motions)
+         limits = walls%motions(walls%wall(w)%motions(k))%motion%limits()
+         moves = moves .or. limits%moves(direction)
       end do
    end function moves
-
-   !> Whether a load displaces a body along a direction, 1, 2 or `along_angle`
-   pure logical function is_loaded(self, s, direction)
-      type(simulation_t), intent(in) :: self
-      integer(ip), intent(in) :: s
-      integer, intent(in) :: direction
-
-      is_loaded = .false.
-      if (allocated(self%walls%loads)) is_loaded = any(self%walls%loads%wall == self%walls%named%wall_of(s) .and. &
-                                                 self%walls%loads%direction == direction)
-   end function is_loaded
 
    !> Raise an error about a fixed body in a periodic cell.
    subroutine refuse(self, s, words, error)

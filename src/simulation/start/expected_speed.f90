@@ -13,7 +13,6 @@ module polydem_expected_speed
    use polydem_run_duration, only: longest_run
    use polydem_settings, only: settings_t, source_settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_wall, only: greatest_wall_speed
    implicit none
    private
    public :: find_expected_speed
@@ -35,22 +34,19 @@ contains
          if (expected%speed > 0.0_wp) return
          call find_start_speed(self%settings%source, self%bodies, self%comm, start)
          fall = 0.0_wp
-         call consider_fall(self, self%settings%forces%gravity, fall)
+         call consider_fall(self, self%forces%gravity, fall)
          do k = 1, size(self%settings%stage)
             if (size(self%settings%stage(k)%gravity) == 2) then
                call consider_fall(self, self%settings%stage(k)%gravity, fall)
             else
-               call consider_fall(self, self%stages%gravity, fall)
+               call consider_fall(self, self%settings%forces%gravity, fall)
             end if
          end do
-         associate (forces => self%settings%forces)
+         associate (forces => self%forces)
             if (forces%shake_frequency > 0.0_wp) &
                fall = fall + hypotenuse(forces%shake(1), forces%shake(2))/(pi*forces%shake_frequency)
          end associate
-         wall = 0.0_wp
-         do k = 1, size(self%walls%driven)
-            wall = max(wall, greatest_wall_speed(self%walls%driven(k), self%bodies%radius, longest_run(self%settings)))
-         end do
+         wall = self%walls%greatest_speed(self%bodies, longest_run(self%settings))
          expected%speed = max(start, fall, wall)
          expected%origin = 'the velocities at the start'
          if (fall > start) expected%origin = 'a fall through the scene'
@@ -96,8 +92,8 @@ contains
       integer :: k
 
       turned = gravity
-      do k = 1, merge(4, 1, abs(self%settings%forces%turn_rate) > 0.0_wp)
-         call find_fall_speed(self%settings, self%bodies, size(self%walls%driven) > 0, self%comm, turned, speed)
+      do k = 1, merge(4, 1, abs(self%forces%turn_rate) > 0.0_wp)
+         call find_fall_speed(self%settings, self%bodies, self%walls%any_driven(), self%comm, turned, speed)
          greatest = max(greatest, speed)
          turned = [-turned(2), turned(1)]
       end do

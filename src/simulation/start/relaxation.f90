@@ -24,8 +24,9 @@ module polydem_relaxation
    use polydem_new_neighbours, only: new_neighbours
    use polydem_source_locations, only: place_of
    use polydem_redistribution, only: have_boxes_left, redistribute
-   use polydem_simulation, only: relaxation_t, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
+   use polydem_start_findings, only: relaxation_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -212,11 +213,11 @@ contains
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(contacts, numbers, bodies, impulse) private(c, mobility)
       do c = 1_ip, contacts%n
-         associate (direction => contacts%direction(:, c))
-            mobility = mobility_of(contacts%first(c), contacts%arm_first(:, c), direction, numbers, bodies) &
-               + mobility_of(contacts%second(c), contacts%arm_second(:, c), direction, numbers, bodies)
+         associate (direction => contacts%row(c)%direction)
+            mobility = mobility_of(contacts%row(c)%first, contacts%row(c)%arm_first, direction, numbers, bodies) &
+               + mobility_of(contacts%row(c)%second, contacts%row(c)%arm_second, direction, numbers, bodies)
          end associate
-         impulse(c) = contacts%depth(c)/mobility
+         impulse(c) = contacts%row(c)%depth/mobility
       end do
       !$omp end parallel do
    end subroutine find_impulses
@@ -259,12 +260,12 @@ contains
          turn = 0.0_wp
          do m = incidence%start_second(s), incidence%start_second(s + 1_ip) - 1_ip
             c = incidence%contact(m)
-            shift = shift - impulse(c)*contacts%direction(:, c)
-            turn = turn - impulse(c)*lever(contacts%arm_second(:, c), contacts%direction(:, c))
+            shift = shift - impulse(c)*contacts%row(c)%direction
+            turn = turn - impulse(c)*lever(contacts%row(c)%arm_second, contacts%row(c)%direction)
          end do
          do c = incidence%start_first(s), incidence%start_first(s + 1_ip) - 1_ip
-            shift = shift + impulse(c)*contacts%direction(:, c)
-            turn = turn + impulse(c)*lever(contacts%arm_first(:, c), contacts%direction(:, c))
+            shift = shift + impulse(c)*contacts%row(c)%direction
+            turn = turn + impulse(c)*lever(contacts%row(c)%arm_first, contacts%row(c)%direction)
          end do
          bodies%position(:, s) = bodies%position(:, s) + shift*bodies%inverse_mass(s)
          bodies%angle(s) = bodies%angle(s) + turn*bodies%inverse_inertia(s)

@@ -29,11 +29,11 @@ contains
       call compute_forces(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call start_integration(self%settings%forces%gravity, self%loop%force_sums, self%bodies, self%motion%integrator, &
+      call start_integration(self%forces%gravity, self%loop%force_sums, self%bodies, self%motion%integrator, &
                              self%history)
       call follow_forces(self, 0.0_wp)
       if (self%settings%output%energy_balance) call start_energy_balance( &
-         self%energy_balance, self%comm, self%settings%forces%gravity, self%bodies, self%loop%force_sums, &
+         self%energy_balance, self%comm, self%forces%gravity, self%bodies, self%loop%force_sums, &
          self%loop%walls)
       call start_participants(self)
       self%timers = timers_t()

@@ -41,15 +41,15 @@ contains
          end do
       end associate
       call reduce_to_greatest(self%comm, density)
-      call consider_weight(self, self%settings%forces%gravity, density(1))
+      call consider_weight(self, self%forces%gravity, density(1))
       do k = 1, size(self%settings%stage)
          if (size(self%settings%stage(k)%gravity) == 2) then
             call consider_weight(self, self%settings%stage(k)%gravity, density(1))
          else
-            call consider_weight(self, self%stages%gravity, density(1))
+            call consider_weight(self, self%settings%forces%gravity, density(1))
          end if
       end do
-      call self%walls%named%find_slots(self%bodies)
+      call self%walls%find_slots(self%bodies)
       do k = 1, size(self%settings%load)
          associate (load => self%settings%load(k))
             call consider(self, load_pressure(self, load, k), 'of &load '//load%name)
@@ -67,7 +67,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: beginning
 
-      associate (forces => self%settings%forces, pressure => self%pressure%greatest)
+      associate (forces => self%forces, pressure => self%pressure%greatest)
          if (.not. allocated(forces%stiffness_over_pressure)) return
          beginning = place_of(self%settings, 'forces', 'stiffness_over_pressure')// &
             ': ''stiffness_over_pressure'' in &forces '
@@ -142,8 +142,8 @@ contains
       associate (wall => self%walls%loads(number)%wall, axis => self%walls%loads(number)%direction)
          if (axis == along_angle) return
          force = abs(load%force)
-         if (load%weight) force = force + load%mass*abs(self%settings%forces%gravity(axis))
-         extent = self%walls%named%extent(wall, 3 - axis, self%bodies)
+         if (load%weight) force = force + load%mass*abs(self%forces%gravity(axis))
+         extent = self%walls%wall(wall)%extent(3 - axis, self%bodies)
          if (extent(2) > extent(1)) pressure = pressure + force/(extent(2) - extent(1))
       end associate
    end function load_pressure

@@ -4,8 +4,8 @@ module polydem_conveyor
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
-   use polydem_motion, only: motion_t, placement_t
-   use polydem_settings, only: motion_settings_t, settings_t
+   use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_settings, only: settings_t
    implicit none
    private
    public :: conveyor_t
@@ -17,23 +17,20 @@ module polydem_conveyor
    contains
       procedure :: configure
       procedure :: placement
-      procedure :: add_bounds
-      procedure :: moves
+      procedure :: limits
    end type conveyor_t
 
 contains
 
    !> Take the velocity.
-   subroutine configure(self, settings, given, error)
+   subroutine configure(self, settings, number, error)
       class(conveyor_t), intent(inout) :: self
       type(settings_t), intent(in) :: settings
-      type(motion_settings_t), intent(in) :: given
+      integer, intent(in) :: number
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (unused => settings)
-      end associate
       if (allocated(error)) return
-      self%velocity = given%velocity
+      self%velocity = settings%motion(number)%velocity
    end subroutine configure
 
    !> The shift at a time, without displacement
@@ -49,25 +46,12 @@ contains
       at%shift(:, 3) = self%velocity*ramp%growth
    end function placement
 
-   !> Add the speed of the surface.
-   pure subroutine add_bounds(self, arm, duration, speed, reach)
+   !> The greatest speed of the surface; the bodies stay.
+   pure function limits(self)
       class(conveyor_t), intent(in) :: self
-      real(wp), intent(in) :: arm, duration
-      real(wp), intent(inout) :: speed, reach
+      type(motion_limits_t) :: limits
 
-      associate (unused_arm => arm, unused_duration => duration, unused_reach => reach)
-      end associate
-      speed = speed + hypotenuse(self%velocity(1), self%velocity(2))
-   end subroutine add_bounds
-
-   !> The bodies stay.
-   pure logical function moves(self, direction)
-      class(conveyor_t), intent(in) :: self
-      integer, intent(in) :: direction
-
-      associate (unused_self => self, unused_direction => direction)
-      end associate
-      moves = .false.
-   end function moves
+      limits%speed = hypotenuse(self%velocity(1), self%velocity(2))
+   end function limits
 
 end module polydem_conveyor

@@ -9,10 +9,10 @@ module polydem_motion
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_settings, only: motion_settings_t, settings_t
+   use polydem_settings, only: settings_t
    implicit none
    private
-   public :: motion_t, motion_item_t, placement_t, pose_bodies, carry_bodies, turn_about
+   public :: motion_t, motion_item_t, motion_limits_t, placement_t, pose_bodies, carry_bodies, turn_about
 
    !> What a motion does to bodies at a time
    type :: placement_t
@@ -24,21 +24,37 @@ module polydem_motion
       real(wp) :: shift(2, 3) = 0.0_wp
    end type placement_t
 
+   !> Upper bounds over all times
+   type :: motion_limits_t
+      !> Angular velocity [rad/s]
+      real(wp) :: spin = 0.0_wp
+      !> Speed of the shift [m/s]
+      real(wp) :: speed = 0.0_wp
+      !> Displacement by the shift; huge: it grows with `speed` as long as the motion acts [m]
+      real(wp) :: shift = 0.0_wp
+      !> Whether places along x and along y, and angles, change
+      logical :: moves(3) = .false.
+   end type motion_limits_t
+
    !> Prescribed motion
    type, abstract, extends(window_t) :: motion_t
       !> Its kind, as in the namelist
       character(len=:), allocatable :: kind
       !> Point about which it turns bodies, (2) [m]
       real(wp) :: pivot(2) = 0.0_wp
+      !> Whether the pivot means something
+      logical :: has_pivot = .false.
+      !> Whether the motion, if it is the first, takes bodies from their reference poses (`pose_bodies`) and not from
+      !> where they are put at rest. It must not both turn and shift them. Zeros have other signs then
+      logical :: starts_from_reference = .false.
+      !> Time from its start from which the bodies rest before the motion ends, for a warning [s]
+      real(wp) :: rests_after = huge(1.0_wp)
+      !> Hash of what the motion has beside the entries of the namelist; 0 if there is nothing
+      integer(lp) :: hash = 0_lp
    contains
       procedure(configure_motion), deferred :: configure
       procedure(find_placement), deferred :: placement
-      procedure(add_bounds), deferred :: add_bounds
-      procedure(moves_along), deferred :: moves
-      procedure :: has_pivot
-      procedure :: starts_from_reference
-      procedure :: rests_from
-      procedure :: hash_of_table
+      procedure(find_limits), deferred :: limits
    end type motion_t
 
    !> A motion of any kind
@@ -49,13 +65,13 @@ module polydem_motion
 
    abstract interface
       !> Take the parameters of the kind from the settings. Window and pivot are set.
-      subroutine configure_motion(self, settings, given, error)
-         import :: motion_t, settings_t, motion_settings_t, error_t
+      subroutine configure_motion(self, settings, number, error)
+         import :: motion_t, settings_t, error_t
          class(motion_t), intent(inout) :: self
          !> All settings
          type(settings_t), intent(in) :: settings
-         !> Those of the motion
-         type(motion_settings_t), intent(in) :: given
+         !> Number of the motion in them
+         integer, intent(in) :: number
          !> Names the entry and what is wrong
          type(error_t), allocatable, intent(inout) :: error
       end subroutine configure_motion
@@ -69,67 +85,15 @@ module polydem_motion
          type(placement_t) :: placement
       end function find_placement
 
-      !> Add the motion to upper bounds over all points of a wall.
-      pure subroutine add_bounds(self, arm, duration, speed, reach)
-         import :: motion_t, wp
+      !> Upper bounds of what the motion does
+      pure function find_limits(self) result(limits)
+         import :: motion_t, motion_limits_t
          class(motion_t), intent(in) :: self
-         !> Greatest distance of a point from the pivot, before all motions [m]
-         real(wp), intent(in) :: arm
-         !> Duration of the run [s]
-         real(wp), intent(in) :: duration
-         !> Speed [m/s], and displacement so far [m]
-         real(wp), intent(inout) :: speed, reach
-      end subroutine add_bounds
-
-      !> Whether the motion changes the places of bodies along a direction, or their angles
-      pure logical function moves_along(self, direction)
-         import :: motion_t
-         class(motion_t), intent(in) :: self
-         !> 1: along x, 2: along y, `along_angle`
-         integer, intent(in) :: direction
-      end function moves_along
+         type(motion_limits_t) :: limits
+      end function find_limits
    end interface
 
 contains
-
-   !> Whether the pivot means something. Default: no.
-   pure logical function has_pivot(self)
-      class(motion_t), intent(in) :: self
-
-      associate (unused => self)
-      end associate
-      has_pivot = .false.
-   end function has_pivot
-
-   !> Whether the motion, if it is the first, takes bodies from their reference poses (`pose_bodies`) and not from where
-   !> they are put at rest. This saves a rounding error. Default: no.
-   pure logical function starts_from_reference(self)
-      class(motion_t), intent(in) :: self
-
-      associate (unused => self)
-      end associate
-      starts_from_reference = .false.
-   end function starts_from_reference
-
-   !> Time from which the bodies rest before the motion ends, for a warning [s]. Default: never.
-   pure real(wp) function rests_from(self)
-      class(motion_t), intent(in) :: self
-
-      associate (unused => self)
-      end associate
-      rests_from = huge(1.0_wp)
-   end function rests_from
-
-   !> Hash of what the motion has beside the entries of the namelist. Default: nothing.
-   pure integer(lp) function hash_of_table(self, before) result(hash)
-      class(motion_t), intent(in) :: self
-      !> Hash of the motions before it
-      integer(lp), intent(in) :: before
-
-      associate (unused => self)
-      end associate
-      hash = before
-   end function hash_of_table
 
    !> Set positions, angles, velocities and accelerations of bodies that one motion moves from their reference poses.
    subroutine pose_bodies(motion, time, slots, position, angle, bodies)

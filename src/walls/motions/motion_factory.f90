@@ -8,7 +8,7 @@ module polydem_motion_factory
    use polydem_oscillation, only: oscillation_t
    use polydem_rotation, only: rotation_t
    use polydem_run_duration, only: number_of_stage
-   use polydem_settings, only: motion_settings_t, settings_t
+   use polydem_settings, only: settings_t
    use polydem_table_motion, only: table_motion_t
    use polydem_translation, only: translation_t
    implicit none
@@ -18,16 +18,16 @@ module polydem_motion_factory
 contains
 
    !> Create a motion. The time in which it starts is that in which it slows down before an end that is known.
-   subroutine new_motion(settings, given, motion, error)
+   subroutine new_motion(settings, number, motion, error)
       !> All settings
       type(settings_t), intent(in) :: settings
-      !> Those of the motion
-      type(motion_settings_t), intent(in) :: given
+      !> Number of the motion in them
+      integer, intent(in) :: number
       class(motion_t), allocatable, intent(out) :: motion
       !> Allocated if what it reads is wrong; names the entry
       type(error_t), allocatable, intent(inout) :: error
 
-      select case (given%kind)
+      select case (settings%motion(number)%kind)
       case ('rotation')
          allocate (rotation_t :: motion)
       case ('translation')
@@ -39,14 +39,16 @@ contains
       case ('table')
          allocate (table_motion_t :: motion)
       case default
-         call raise(error, input_error, 'there is no motion of the kind '//trim(given%kind))
+         call raise(error, input_error, 'there is no motion of the kind '//trim(settings%motion(number)%kind))
          return
       end select
-      motion%kind = trim(given%kind)
-      motion%pivot = given%pivot
-      motion%window_t = new_window(given%start, given%end, given%ramp, number_of_stage(settings, given%stage))
-      if (given%end > 0.0_wp) motion%ramp_down = given%ramp
-      call motion%configure(settings, given, error)
+      associate (given => settings%motion(number))
+         motion%kind = trim(given%kind)
+         motion%pivot = given%pivot
+         motion%window_t = new_window(given%start, given%end, given%ramp, number_of_stage(settings, given%stage))
+         if (given%end > 0.0_wp) motion%ramp_down = given%ramp
+      end associate
+      call motion%configure(settings, number, error)
    end subroutine new_motion
 
 end module polydem_motion_factory

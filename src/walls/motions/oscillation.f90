@@ -1,12 +1,12 @@
 !> Oscillation of fixed bodies: x = x0 + a sin(w e(t)) with the ramped time e. The amplitude is full from the start; the
 !> frequency rises.
 module polydem_oscillation
-   use polydem_driven, only: along_angle, ramp_t
+   use polydem_driven, only: ramp_t
    use polydem_elementary, only: hypotenuse, sine_and_cosine, two_pi
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
-   use polydem_motion, only: motion_t, placement_t
-   use polydem_settings, only: motion_settings_t, settings_t
+   use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_settings, only: settings_t
    implicit none
    private
    public :: oscillation_t
@@ -20,25 +20,22 @@ module polydem_oscillation
    contains
       procedure :: configure
       procedure :: placement
-      procedure :: add_bounds
-      procedure :: moves
-      procedure :: starts_from_reference
+      procedure :: limits
    end type oscillation_t
 
 contains
 
    !> Take amplitude and frequency; hertz become radians per second.
-   subroutine configure(self, settings, given, error)
+   subroutine configure(self, settings, number, error)
       class(oscillation_t), intent(inout) :: self
       type(settings_t), intent(in) :: settings
-      type(motion_settings_t), intent(in) :: given
+      integer, intent(in) :: number
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (unused => settings)
-      end associate
       if (allocated(error)) return
-      self%amplitude = given%amplitude
-      self%frequency = two_pi*given%frequency
+      self%amplitude = settings%motion(number)%amplitude
+      self%frequency = two_pi*settings%motion(number)%frequency
+      self%starts_from_reference = .true.
    end subroutine configure
 
    !> The shift at a time
@@ -58,34 +55,14 @@ contains
       at%shift(:, 3) = self%amplitude*(self%frequency*ramp%growth*c - rate**2*s)
    end function placement
 
-   !> Add the greatest speed, and the amplitude.
-   pure subroutine add_bounds(self, arm, duration, speed, reach)
+   !> The greatest speed, and the amplitude
+   pure function limits(self)
       class(oscillation_t), intent(in) :: self
-      real(wp), intent(in) :: arm, duration
-      real(wp), intent(inout) :: speed, reach
+      type(motion_limits_t) :: limits
 
-      associate (unused_arm => arm, unused_duration => duration)
-      end associate
-      speed = speed + self%frequency*hypotenuse(self%amplitude(1), self%amplitude(2))
-      reach = reach + hypotenuse(self%amplitude(1), self%amplitude(2))
-   end subroutine add_bounds
-
-   !> Whether it has an amplitude along an axis
-   pure logical function moves(self, direction)
-      class(oscillation_t), intent(in) :: self
-      integer, intent(in) :: direction
-
-      moves = .false.
-      if (direction /= along_angle) moves = abs(self%amplitude(direction)) > 0.0_wp
-   end function moves
-
-   !> It can start from reference.
-   pure logical function starts_from_reference(self)
-      class(oscillation_t), intent(in) :: self
-
-      associate (unused => self)
-      end associate
-      starts_from_reference = .true.
-   end function starts_from_reference
+      limits%speed = self%frequency*hypotenuse(self%amplitude(1), self%amplitude(2))
+      limits%shift = hypotenuse(self%amplitude(1), self%amplitude(2))
+      limits%moves(:2) = abs(self%amplitude) > 0.0_wp
+   end function limits
 
 end module polydem_oscillation

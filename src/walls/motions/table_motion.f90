@@ -4,9 +4,9 @@ module polydem_table_motion
    use polydem_errors, only: error_t
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, lp, wp
-   use polydem_motion, only: motion_t, placement_t
+   use polydem_motion, only: motion_limits_t, motion_t, placement_t
    use polydem_motion_table, only: evaluate_table, greatest_rates, greatest_values, motion_table_t
-   use polydem_settings, only: motion_settings_t, settings_t
+   use polydem_settings, only: settings_t
    use polydem_table_file, only: read_motion_table
    implicit none
    private
@@ -16,29 +16,34 @@ module polydem_table_motion
    type, extends(motion_t) :: table_motion_t
       !> Its poses
       type(motion_table_t) :: table
-      !> Greatest displacements along x and y [m] and angle [rad]
-      real(wp) :: values(3) = 0.0_wp
    contains
       procedure :: configure
       procedure :: placement
-      procedure :: add_bounds
-      procedure :: moves
-      procedure :: has_pivot
-      procedure :: rests_from
-      procedure :: hash_of_table
+      procedure :: limits
    end type table_motion_t
 
 contains
 
    !> Read the table.
-   subroutine configure(self, settings, given, error)
+   subroutine configure(self, settings, number, error)
       class(table_motion_t), intent(inout) :: self
       type(settings_t), intent(in) :: settings
-      type(motion_settings_t), intent(in) :: given
+      integer, intent(in) :: number
       type(error_t), allocatable, intent(inout) :: error
+      integer :: i, j
 
-      call read_motion_table(settings, given, self%table, error)
-      if (.not. allocated(error)) self%values = greatest_values(self%table)
+      call read_motion_table(settings, settings%motion(number), self%table, error)
+      if (allocated(error)) return
+      self%has_pivot = .true.
+      associate (table => self%table)
+         self%rests_after = table%time(size(table%time))
+         do j = 1, size(table%time)
+            self%hash = mix_word(self%hash, transfer(real(table%time(j), dp), 0_lp))
+            do i = 1, 3
+               self%hash = mix_word(self%hash, transfer(real(table%value(i, j), dp), 0_lp))
+            end do
+         end do
+      end associate
    end subroutine configure
 
    !> Turn and shift at a time
@@ -59,58 +64,18 @@ contains
       at%shift = reshape([value(:2), rate(:2), growth(:2)], [2, 3])
    end function placement
 
-   !> Add the greatest rates and values of the table.
-   pure subroutine add_bounds(self, arm, duration, speed, reach)
+   !> The greatest rates and values of the table
+   pure function limits(self)
       class(table_motion_t), intent(in) :: self
-      real(wp), intent(in) :: arm, duration
-      real(wp), intent(inout) :: speed, reach
-      real(wp) :: rates(3)
+      type(motion_limits_t) :: limits
+      real(wp) :: rates(3), values(3)
 
-      associate (unused => duration)
-      end associate
       rates = greatest_rates(self%table)
-      speed = speed + rates(3)*(arm + reach) + hypotenuse(rates(1), rates(2))
-      if (self%values(3) > 0.0_wp) reach = reach + 2.0_wp*(arm + reach)
-      reach = reach + hypotenuse(self%values(1), self%values(2))
-   end subroutine add_bounds
-
-   !> Whether the table has other values than 0 for a direction
-   pure logical function moves(self, direction)
-      class(table_motion_t), intent(in) :: self
-      integer, intent(in) :: direction
-
-      moves = self%values(direction) > 0.0_wp
-   end function moves
-
-   !> It turns about its pivot.
-   pure logical function has_pivot(self)
-      class(table_motion_t), intent(in) :: self
-
-      associate (unused => self)
-      end associate
-      has_pivot = .true.
-   end function has_pivot
-
-   !> The time of the last row
-   pure real(wp) function rests_from(self)
-      class(table_motion_t), intent(in) :: self
-
-      rests_from = self%start + self%table%time(size(self%table%time))
-   end function rests_from
-
-   !> Hash of all rows
-   pure integer(lp) function hash_of_table(self, before) result(hash)
-      class(table_motion_t), intent(in) :: self
-      integer(lp), intent(in) :: before
-      integer :: i, j
-
-      hash = before
-      do j = 1, size(self%table%time)
-         hash = mix_word(hash, transfer(real(self%table%time(j), dp), 0_lp))
-         do i = 1, 3
-            hash = mix_word(hash, transfer(real(self%table%value(i, j), dp), 0_lp))
-         end do
-      end do
-   end function hash_of_table
+      values = greatest_values(self%table)
+      limits%spin = rates(3)
+      limits%speed = hypotenuse(rates(1), rates(2))
+      limits%shift = hypotenuse(values(1), values(2))
+      limits%moves = values > 0.0_wp
+   end function limits
 
 end module polydem_table_motion

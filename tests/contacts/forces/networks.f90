@@ -146,8 +146,8 @@ contains
                      + dt*[bodies%force(:, s)*bodies%inverse_mass(s), bodies%torque(s)*bodies%inverse_inertia(s)]
                end do
             else
-               call add_force(contacts%first(k), 1.0_wp, contacts%arm_first(:, k))
-               call add_force(contacts%second(k), -1.0_wp, contacts%arm_second(:, k))
+               call add_force(contacts%row(k)%first, 1.0_wp, contacts%row(k)%arm_first)
+               call add_force(contacts%row(k)%second, -1.0_wp, contacts%row(k)%arm_second)
             end if
             do c = 1_ip, contacts%n
                if (k == 0_ip) free_slip(c) = slip(c)
@@ -165,7 +165,7 @@ contains
          real(wp) :: force(2)
 
          if (scene%bodies%fixed(body)) return
-         force = sign_of_force*[-scene%contacts%direction(2, k), scene%contacts%direction(1, k)]
+         force = sign_of_force*[-scene%contacts%row(k)%direction(2), scene%contacts%row(k)%direction(1)]
          velocity(1:2, body) = dt*scene%bodies%inverse_mass(body)*force
          velocity(3, body) = dt*scene%bodies%inverse_inertia(body)*(arm(1)*force(2) - arm(2)*force(1))
       end subroutine add_force
@@ -174,9 +174,9 @@ contains
          integer(ip), intent(in) :: c
          real(wp) :: difference(2)
 
-         difference = at(scene%contacts%first(c), scene%contacts%arm_first(:, c)) &
-            - at(scene%contacts%second(c), scene%contacts%arm_second(:, c))
-         slip = scene%contacts%direction(1, c)*difference(2) - scene%contacts%direction(2, c)*difference(1)
+         difference = at(scene%contacts%row(c)%first, scene%contacts%row(c)%arm_first) &
+            - at(scene%contacts%row(c)%second, scene%contacts%row(c)%arm_second)
+         slip = scene%contacts%row(c)%direction(1)*difference(2) - scene%contacts%row(c)%direction(2)*difference(1)
       end function slip
 
       !> Velocity of a point of a body
@@ -200,12 +200,13 @@ contains
       real(wp), intent(in) :: dt
       !> Friction coefficient
       real(wp), intent(in) :: friction
-      real(wp), allocatable :: matrix(:, :), slip(:)
+      real(wp), allocatable :: matrix(:, :), slip(:), f(:)
       real(wp) :: scale
       integer(ip) :: c
 
       call dense_of(scene, dt, matrix, slip)
-      associate (n => scene%contacts%n, f => scene%contacts%tangential_force)
+      f = scene%contacts%row%tangential_force
+      associate (n => scene%contacts%n)
          scale = 0.0_wp
          do c = 1_ip, n
             scale = max(scale, matrix(c, c)*abs(f(c)))
@@ -213,7 +214,7 @@ contains
          end do
          kkt_error = 0.0_wp
          do c = 1_ip, n
-            associate (limit => friction*scene%contacts%normal_force(c))
+            associate (limit => friction*scene%contacts%row(c)%normal_force)
                kkt_error = max(kkt_error, (abs(f(c)) - limit)/(limit + tiny(limit)))
                if (abs(f(c)) < limit) then
                   kkt_error = max(kkt_error, abs(slip(c))/scale)
@@ -261,15 +262,15 @@ contains
       real(wp), intent(in) :: direction(2), normal_force, arm_first(2), arm_second(2)
 
       associate (contacts => scene%contacts)
-         contacts%pair(c) = c
-         contacts%first(c) = i
-         contacts%second(c) = j
-         contacts%direction(:, c) = direction
-         contacts%length(c) = 0.01_wp
-         contacts%normal(:, c) = -0.01_wp*direction
-         contacts%normal_force(c) = normal_force
-         contacts%arm_first(:, c) = arm_first
-         contacts%arm_second(:, c) = arm_second
+         contacts%row(c)%pair = c
+         contacts%row(c)%first = i
+         contacts%row(c)%second = j
+         contacts%row(c)%direction = direction
+         contacts%row(c)%length = 0.01_wp
+         contacts%row(c)%normal = -0.01_wp*direction
+         contacts%row(c)%normal_force = normal_force
+         contacts%row(c)%arm_first = arm_first
+         contacts%row(c)%arm_second = arm_second
       end associate
    end subroutine set_contact
 
@@ -278,7 +279,7 @@ contains
       integer(ip), intent(in) :: n_contacts
 
       scene%contacts%n = n_contacts
-      scene%contacts%tangential_force(1:n_contacts) = 0.0_wp
+      scene%contacts%row(1:n_contacts)%tangential_force = 0.0_wp
       call add_column(scene%history, history_kind_t('tangential', 'N/m', ''), n_contacts)
       call index_contacts(scene%bodies%n, scene%contacts, scene%incidence)
    end subroutine finish

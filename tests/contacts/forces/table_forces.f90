@@ -1,9 +1,9 @@
 !> Forces of a table of contacts: the blocks of the table pass one part, or a whole law.
 module table_forces
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: block_size, contact_block_t, copy_motion, load_block, store_forces
+   use polydem_contact_block, only: block_size, contact_block_t, copy_motion, store_forces
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
+   use polydem_contacts, only: contacts_t, load_block
    use polydem_force_law, only: force_law_t
    use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp
@@ -62,7 +62,7 @@ contains
          if (present(law)) call law%apply(bodies, dt, block, history)
          if (present(part)) call part%add(bodies, dt, block, history)
          do b = 1_ip, block%n
-            call store_forces(block, b, contacts, high - b + 1_ip)
+            call store_forces(block, b, contacts%row(high - b + 1_ip))
          end do
       end do
    end subroutine walk

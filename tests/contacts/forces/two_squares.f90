@@ -42,22 +42,22 @@ contains
       call reserve_contacts(contacts, 1_ip)
       arm = 0.5_wp*(width - depth)
       contacts%n = 1_ip
-      contacts%pair(1) = 1_ip
-      contacts%first(1) = 1_ip
-      contacts%second(1) = 2_ip
-      contacts%area(1) = width*depth
-      contacts%rate(1) = width
-      contacts%normal(:, 1) = [0.0_wp, width]
-      contacts%moment(:, 1) = 0.0_wp
-      contacts%arm_first(:, 1) = [0.0_wp, arm]
-      contacts%arm_second(:, 1) = [0.0_wp, -arm]
-      contacts%direction(:, 1) = [0.0_wp, -1.0_wp]
-      contacts%length(1) = width
-      contacts%length_square(1) = width**2 + depth**2
-      contacts%lever(1) = 0.0_wp
-      contacts%elastic(1) = 0.0_wp
-      contacts%normal_force(1) = 0.0_wp
-      contacts%tangential_force(1) = 0.0_wp
+      contacts%row(1)%pair = 1_ip
+      contacts%row(1)%first = 1_ip
+      contacts%row(1)%second = 2_ip
+      contacts%row(1)%area = width*depth
+      contacts%row(1)%rate = width
+      contacts%row(1)%normal = [0.0_wp, width]
+      contacts%row(1)%moment = 0.0_wp
+      contacts%row(1)%arm_first = [0.0_wp, arm]
+      contacts%row(1)%arm_second = [0.0_wp, -arm]
+      contacts%row(1)%direction = [0.0_wp, -1.0_wp]
+      contacts%row(1)%length = width
+      contacts%row(1)%length_square = width**2 + depth**2
+      contacts%row(1)%lever = 0.0_wp
+      contacts%row(1)%elastic = 0.0_wp
+      contacts%row(1)%normal_force = 0.0_wp
+      contacts%row(1)%tangential_force = 0.0_wp
       call add_column(history, history_kind_t('tangential', 'N/m', ''), 1_ip)
       call add_column(history, history_kind_t('area', 'm2', ''), 1_ip)
    end subroutine make_contact

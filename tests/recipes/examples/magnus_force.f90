@@ -4,6 +4,7 @@ module polydem_magnus_force
    use polydem_bodies, only: bodies_t, block_size
    use polydem_body_force, only: body_force_t
    use polydem_kinds, only: ip, wp
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: magnus_force_t
@@ -11,12 +12,21 @@ module polydem_magnus_force
    !> Force of Magnus
    type, extends(body_force_t) :: magnus_force_t
       !> Coefficient c
-      real(wp) :: coefficient = 0.5_wp
+      real(wp) :: coefficient = 0.0_wp
    contains
+      procedure :: configure
       procedure :: add
    end type magnus_force_t
 
 contains
+
+   !> Copy the coefficient from the settings.
+   subroutine configure(self, settings)
+      class(magnus_force_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+
+      self%coefficient = settings%magnus
+   end subroutine configure
 
    !> Add the force.
    pure subroutine add(self, others, bodies, slots, force)

@@ -1,12 +1,12 @@
 !> Motion of fixed bodies on a circle without a turn, as of an orbital shaker: x = x0 + a (cos(w e(t)) - 1,
 !> sin(w e(t))), with the ramped time e.
 module polydem_orbit
-   use polydem_driven, only: along_angle, ramp_t
+   use polydem_driven, only: ramp_t
    use polydem_elementary, only: sine_and_cosine, two_pi
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
-   use polydem_motion, only: motion_t, placement_t
-   use polydem_settings, only: motion_settings_t, settings_t
+   use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_settings, only: settings_t
    implicit none
    private
    public :: orbit_t
@@ -18,24 +18,21 @@ module polydem_orbit
    contains
       procedure :: configure
       procedure :: placement
-      procedure :: add_bounds
-      procedure :: moves
+      procedure :: limits
    end type orbit_t
 
 contains
 
    !> Take radius and rate.
-   subroutine configure(self, settings, given, error)
+   subroutine configure(self, settings, number, error)
       class(orbit_t), intent(inout) :: self
       type(settings_t), intent(in) :: settings
-      type(motion_settings_t), intent(in) :: given
+      integer, intent(in) :: number
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (unused => settings)
-      end associate
       if (allocated(error)) return
-      self%radius = given%amplitude(1)
-      self%rate = two_pi*given%frequency
+      self%radius = settings%motion(number)%amplitude(1)
+      self%rate = two_pi*settings%motion(number)%frequency
    end subroutine configure
 
    !> The shift at a time
@@ -55,24 +52,14 @@ contains
       at%shift(:, 3) = self%radius*(self%rate*ramp%growth*[-s, c] - rate**2*[c, s])
    end function placement
 
-   !> Add the speed, and the diameter of the circle.
-   pure subroutine add_bounds(self, arm, duration, speed, reach)
+   !> The speed, and the diameter of the circle; places change, but no angle.
+   pure function limits(self)
       class(orbit_t), intent(in) :: self
-      real(wp), intent(in) :: arm, duration
-      real(wp), intent(inout) :: speed, reach
+      type(motion_limits_t) :: limits
 
-      associate (unused_arm => arm, unused_duration => duration)
-      end associate
-      speed = speed + self%rate*abs(self%radius)
-      reach = reach + 2.0_wp*abs(self%radius)
-   end subroutine add_bounds
-
-   !> It changes both places, but no angle.
-   pure logical function moves(self, direction)
-      class(orbit_t), intent(in) :: self
-      integer, intent(in) :: direction
-
-      moves = direction /= along_angle .and. abs(self%radius) > 0.0_wp
-   end function moves
+      limits%speed = self%rate*abs(self%radius)
+      limits%shift = 2.0_wp*abs(self%radius)
+      limits%moves(:2) = abs(self%radius) > 0.0_wp
+   end function limits
 
 end module polydem_orbit

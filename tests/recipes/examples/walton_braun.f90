@@ -10,6 +10,7 @@ module polydem_walton_braun
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
+   use polydem_pair_entries, only: at_plasticity
    use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -33,7 +34,8 @@ contains
       type(pair_parameters_t), intent(in) :: pairs
 
       call self%take_coefficients(settings, pairs)
-      self%coefficient = pairs%damping_coefficient
+      self%logged = [at_plasticity]
+      self%coefficient = pairs%plasticity
       self%history_kinds = [history_kind_t('greatest_area', 'm2', 'greatest area of the contact so far')]
    end subroutine configure
 

@@ -45,8 +45,7 @@ def claims_document(bench: Bench, judged: list | None = None) -> str:
     ]
     for each, finding in judged:
         lines += [
-            f"**{each.id}** {each.text}. *Rule:* {each.threshold}. *Verdict:* {finding.verdict}. "
+            f"* **{each.id}** {each.text}. *Rule:* {each.threshold}. *Verdict:* {finding.verdict}. "
             f"{finding.reason}".rstrip(),
-            "",
         ]
-    return "\n".join(lines)
+    return "\n".join([*lines, ""])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import shutil
 from math import exp, log
 from pathlib import Path
+from textwrap import wrap
 
 from polydem_post.base.result_file import ResultError, cannot_write
 
 from ..bench.series import SWEEP, TREE
 from ..bench.statistics import number
 from ..claims.rules_structure import FAILS
-from ..claims.verdicts import CONFIRMED, CONTRADICTED, OF_PARTS, PARTS_BELOW
+from ..claims.verdicts import CONFIRMED, CONTRADICTED, NOT_MEASURED, NOT_TESTABLE, OF_PARTS, PARTS_BELOW
 from ..fine_grained.model import OBVIOUS
 from .report import Contents
 
@@ -21,8 +22,8 @@ PAGE, TABLES = "README.md", "tables"
 #: The title, by which a page is known
 TITLE = "# Results of the laboratory on one machine"
 
-#: Figure that stands beside the answers
-FIRST_FIGURE = "finders_over_size"
+#: Figure that stands beside the answers, and one that no claim names; the others are those behind verdicts
+FIRST_FIGURE, ALL_SCENES = "finders_over_size", "all_scenes"
 
 #: What stands behind the answers
 HEAD = """## Verdicts
@@ -49,7 +50,7 @@ def publish(contents: Contents, mode: str, report: Path, folder: Path) -> Path:
         (folder / TABLES).mkdir(parents=True, exist_ok=True)
         for old in [*folder.glob("*.png"), *(folder / TABLES).glob("*.csv")]:
             old.unlink()
-        for drawing in _here(contents.drawings):
+        for drawing in _behind_verdicts(contents):
             shutil.copyfile(report / "figures" / f"{drawing.name}.png", folder / f"{drawing.name}.png")
         for name in [*(f"{table.name}.csv" for table in _here(contents.tables)), "revision.txt"]:
             shutil.copyfile(report / "tables" / name, folder / TABLES / name)
@@ -71,14 +72,13 @@ def written(contents: Contents, mode: str) -> str:
         if drawing.name == FIRST_FIGURE:
             lines += [f"![{drawing.name}]({drawing.name}.png)", "", drawing.caption, ""]
     lines += [judged, "", head, how, "", rules, "## Figures", ""]
-    for drawing in _here(contents.drawings):
+    for drawing in _behind_verdicts(contents):
         if drawing.name == FIRST_FIGURE:
             continue
         lines += [f"![{drawing.name}]({drawing.name}.png)", "", drawing.caption, ""]
-    lines += ["## Tables", "", f"The folder [{TABLES}]({TABLES}) holds all tables as comma-separated values:", "",
-              "| file | contents |", "|---|---|"]
-    lines += [f"| [{table.name}.csv]({TABLES}/{table.name}.csv) | {table.title} |"
-              for table in sorted(_here(contents.tables), key=lambda each: each.name)]
+    links = ", ".join(f"[{table.name}]({TABLES}/{table.name}.csv)"
+                      for table in sorted(_here(contents.tables), key=lambda each: each.name))
+    lines += ["## Tables", "", *wrap(f"All tables as comma-separated values: {links}.", 120, break_long_words=False)]
     return "\n".join(lines) + "\n"
 
 
@@ -138,6 +138,15 @@ def which_finder(scenes: list[dict]) -> list[str]:
     return lines
 
 
+def _behind_verdicts(contents: Contents) -> list:
+    """Figures that the page shows: those that a claim with a verdict names, and two others."""
+    named = {FIRST_FIGURE, ALL_SCENES}
+    for *_, verdict, where in contents.table("claims").rows:
+        if verdict not in (NOT_MEASURED, NOT_TESTABLE):
+            named |= set(where.split(", "))
+    return [each for each in _here(contents.drawings) if each.name in named]
+
+
 def _here(things: list) -> list:
-    """Tables or figures that the page shows."""
+    """Tables, or figures, that are not of other pages."""
     return [each for each in things if not each.name.startswith(ELSEWHERE)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from polydem_post.base.result_file import cannot_write
@@ -12,8 +13,9 @@ from ..report.files import write_figures, write_tables
 from .points import Comparison, read_comparison
 from .tables import all_tables
 
-#: Tables that are too long for the page
-NOT_ON_THE_PAGE = ("rivals_points", "rivals_seeds")
+#: Tables that are too long for the page, which links to them
+NOT_ON_THE_PAGE = ("rivals_cheapest", "rivals_stiffness", "rivals_collective", "rivals_spread", "rivals_points",
+                   "rivals_seeds")
 
 #: Name of the page in a report, and of the one that is published; the figures that are
 PAGE, PUBLISHED = "rivals.md", "tables.md"
@@ -32,8 +34,11 @@ def write_rivals_report(folder: Path, figures: bool = True) -> list[Path]:
 
             written += write_figures(rivals_drawings(found, folder), output / "figures")
         page = output / PAGE
-        shown = [table.document("markdown") for table in tables if table.name not in NOT_ON_THE_PAGE]
-        page.write_text("# Tables of speed against error beside other codes\n\n`./polydem rivals` made this page.\n\n"
+        shown = [replace(table, origin="").document("markdown") for table in tables
+                 if table.name not in NOT_ON_THE_PAGE]
+        page.write_text("# Tables of speed against error beside other codes\n\n`./polydem rivals` made this page. The "
+                        "folder [tables](tables) has all tables, also times for an error, errors over stiffness, "
+                        f"means over\nseeds, and every point. {origin}\n\n"
                         + "\n".join(shown).replace("\n### ", "\n## ").replace("### ", "## ", 1), encoding="utf-8")
     except OSError as error:
         raise cannot_write(output, error) from error

@@ -30,8 +30,8 @@ NONE = "-"
 
 def all_tables(found: Comparison, folder: Path) -> list[Table]:
     """Every table of a report that has rows."""
-    tables = [cheapest(found), least(found), stiffness(found), profile(found), collective(found), body_steps(found),
-              spread(found), left_out(found, folder), seeds(found), points(found)]
+    tables = [ratios(found), cheapest(found), least(found), stiffness(found), profile(found), collective(found),
+              body_steps(found), spread(found), left_out(found, folder), seeds(found), points(found)]
     return [table for table in tables if table.rows]
 
 
@@ -48,6 +48,20 @@ def cheapest(found: Comparison) -> Table:
         "and time is interpolated to the point before; - if no series of a code keeps it. Errors below what is known "
         "of the right answer are left out."
     )
+    return table
+
+
+def ratios(found: Comparison) -> Table:
+    """Times of polydem over those of the cheapest rival, errors side by side."""
+    errors = sorted({error for _, error in found.judged()}, reverse=True)
+    table = Table("rivals_ratios", "Time of polydem over that of the cheapest rival, for an error",
+                  ("problem", *(f"{error:g}" for error in errors)), texts=1)
+    rows = {(row[0], row[1]): row[-1] for row in cheapest(found).rows}
+    for problem in dict.fromkeys(name for name, _ in rows):
+        table.add(problem, *(rows.get((problem, f"{error:g}"), NONE) for error in errors))
+    table.note = (f"{CLOCK} An error is kept by the first point of a series that is below it together with the next "
+                  "finer one, and time is interpolated to the point before. *Never*: no series of polydem keeps it; -: "
+                  "no code does, or less is known of the right answer. The times: rivals_cheapest.csv.")
     return table
 
 
@@ -177,8 +191,11 @@ def left_out(found: Comparison, folder: Path) -> Table:
                 omitted.setdefault(why, []).append(problem)
         for why, names in omitted.items():
             table.add(module.NAME, ", ".join(names), why)
+    failed: dict = {}
     for sample in found.failures():
-        table.add(sample.series, f"{sample.problem}, level {sample.level}", sample.message)
+        failed.setdefault((sample.series, sample.problem, sample.message), []).append(f"{sample.level}")
+    for (series, problem, message), levels in failed.items():
+        table.add(series, f"{problem}, level {', '.join(dict.fromkeys(levels))}", message)
     return table
 
 

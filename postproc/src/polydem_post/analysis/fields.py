@@ -148,7 +148,7 @@ class _Grid:
                  window: tuple[float, float, float, float] | None):
         self.kernel, self.spacing = kernel, spacing
         # Copies above and below a sheared cell have other velocities.
-        inset = np.array([0.0, kernel.range if frame.slid is not None else 0.0])
+        inset = np.array([0.0, kernel.range if frame.shear_offset is not None else 0.0])
         inner_low, inner_high = frame.cell_low + inset, frame.cell_low + frame.cell_size - inset
         if window is None:
             bounds = frame.bounds[frame.free]
@@ -160,7 +160,7 @@ class _Grid:
             high = np.where(frame.cell_size > 0.0, inner_high, high)
         else:
             low, high = np.array(window[:2], dtype=float), np.array(window[2:], dtype=float)
-            if frame.slid is not None and (low[1] < inner_low[1] or high[1] > inner_high[1]):
+            if frame.shear_offset is not None and (low[1] < inner_low[1] or high[1] > inner_high[1]):
                 raise ResultError("the window must keep the range of the kernel away from the upper and lower border "
                                   f"of the sheared cell: {inner_low[1]:g} to {inner_high[1]:g} m")
         if np.any(high - low < 2.0 * spacing):

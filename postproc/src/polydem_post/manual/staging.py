@@ -22,7 +22,7 @@ MOST_LINES = 2000
 
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?!\w+:|#)([^)\s#]+)")
-REMARK = re.compile(r"^<!-- (tests run|tests do not run this): (.*?)\s+-->\n", re.MULTILINE | re.DOTALL)
+NOTE = re.compile(r"^<!-- (tests run|tests do not run this): (.*?)\s+-->\n", re.MULTILINE | re.DOTALL)
 
 
 def find_pages(root: Path) -> list[Path]:
@@ -55,7 +55,7 @@ def stage(root: Path, folder: Path) -> list[Path]:
     linked: set[Path] = set()
     for page in pages:
         text = (root / page).read_text(encoding="utf-8")
-        _write(folder / page, _show_remarks(_redirect(root, page, text, linked)))
+        _write(folder / page, _show_notes(_redirect(root, page, text, linked)))
     for target in sorted(linked):
         _stage_linked(root, target, folder)
     return pages
@@ -105,9 +105,9 @@ def _write_page(path: Path, title: str, text: str) -> None:
     _write(path, f"---\nsearch:\n  exclude: true\n---\n\n# {title}\n\n{text}\n")
 
 
-def _show_remarks(text: str) -> str:
-    """Text in which the remarks on tests below command blocks, which are comments, are small print."""
-    return REMARK.sub(lambda found: "\n" + _small_print(found.group(1), found.group(2)) + "\n", text)
+def _show_notes(text: str) -> str:
+    """Text in which the notes on tests below command blocks, which are comments, are small print."""
+    return NOTE.sub(lambda found: "\n" + _small_print(found.group(1), found.group(2)) + "\n", text)
 
 
 def _small_print(kind: str, words: str) -> str:

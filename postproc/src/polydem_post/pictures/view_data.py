@@ -171,7 +171,7 @@ class _Everybody:
             return frame, None
         present = np.isin(self._bodies["id"], frame.id)
         columns: dict[str, Any] = {}
-        for name in ("position", "angle", "velocity", "angular_velocity", "image", "slid"):
+        for name in ("position", "angle", "velocity", "angular_velocity", "image", "shear_offset"):
             values = getattr(frame, name)
             if values is None:
                 continue

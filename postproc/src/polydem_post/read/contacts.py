@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +41,10 @@ class Contacts:
         first_arm     [m]    vector from the centre of mass of the first body to the point, (m, 2)
         second_arm    [m]    vector from the centre of mass of the second body to the point, (m, 2)
         with_fixed    [1]    whether one of the two bodies is fixed, (m)
+
+    Of the file, too, if it has columns of other names:
+
+        others        [SI]   these by name, as in contacts.others["slip"]; the file has their units, (m) or (m, 2)
     """
 
     first: npt.NDArray[np.integer[Any]]
@@ -57,6 +61,7 @@ class Contacts:
     first_arm: FloatArray
     second_arm: FloatArray
     with_fixed: npt.NDArray[np.bool_]
+    others: dict[str, FloatArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Number of contacts."""

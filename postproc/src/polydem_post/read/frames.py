@@ -69,7 +69,7 @@ class Frame:
         material          [1]      numbers of the materials: position in `material_names`, from 1; 0: none, (n)
         material_names    [1]      list of the names of the materials of the run
         image             [1]      cells crossed along each axis, (n, 2); None in the plane
-        slid              [m]      shifts of the borders of a sheared cell that each body has crossed, (n)
+        shear_offset              [m]      shifts of the borders of a sheared cell that each body has crossed, (n)
         shift             [m]      displacement of the copy of a sheared cell above it, along x as of vectors
         cell_low          [m]      x and y of the lower left corner of the periodic cell, as of vectors
         cell_size         [m]      width and height of the periodic cell, as of vectors; 0 along an axis without period
@@ -97,7 +97,7 @@ class Frame:
     material: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     material_names: tuple[str, ...] = ()
     image: IntArray | None = None
-    slid: FloatArray | None = None
+    shear_offset: FloatArray | None = None
     shift: float = 0.0
     cell_low: FloatArray = field(default_factory=lambda: np.zeros(2))
     cell_size: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -193,7 +193,7 @@ class Frame:
         if self.image is None:
             return self.position
         path = self.position + self.image * self.cell_size
-        return path if self.slid is None else path + np.column_stack([self.slid, np.zeros(len(self))])
+        return path if self.shear_offset is None else path + np.column_stack([self.shear_offset, np.zeros(len(self))])
 
     @property
     def shifts(self) -> FloatArray:
@@ -392,7 +392,8 @@ class _Given:
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
     """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0.
 
-    Columns of file layouts before 7 have no length and no couple, and the area gradient as normal.
+    Columns of file layouts before 7 have no length and no couple, and the area gradient as normal. Columns of other
+    names become those of `others`.
     """
     first, second = (_index_of(frame, columns[name]) for name in ("first", "second"))
     branch = frame.position[first] - frame.position[second]
@@ -406,8 +407,10 @@ def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
         way = np.where(length[:, None] > 0.0, columns["normal"], -branch)
         columns = {**columns, "length": length, "normal": unit_vectors(way), "couple": np.full(len(first), np.nan)}
     return Contacts(
-        **{name: columns[name] for name in CONTACT_FIELDS}, first_index=first, second_index=second, branch=branch,
-        first_arm=first_arm, second_arm=second_arm, with_fixed=frame.fixed[first] | frame.fixed[second])
+        **{name: columns[name] for name in CONTACT_FIELDS},
+        others={name: values for name, values in columns.items() if name not in CONTACT_FIELDS},
+        first_index=first, second_index=second, branch=branch, first_arm=first_arm, second_arm=second_arm,
+        with_fixed=frame.fixed[first] | frame.fixed[second])
 
 
 def unit_vectors(vectors: FloatArray) -> FloatArray:
@@ -439,8 +442,8 @@ def sound_frame(path: Path, frame: Frame) -> Frame:
     insist(path, "cell", cell, dict.fromkeys(cell, (2,)))
     if frame.image is not None:
         insist(path, "frames", {"image": frame.image}, {"image": (n, 2)})
-    if frame.slid is not None:
-        insist(path, "frames", {"slid": frame.slid}, {"slid": (n,)})
+    if frame.shear_offset is not None:
+        insist(path, "frames", {"shear_offset": frame.shear_offset}, {"shear_offset": (n,)})
     masses = {"mass": frame.mass, "inertia": frame.inertia}
     if np.any(frame.material < 0) or np.any(frame.material > len(frame.material_names)):
         raise ResultError(f"{path}: bodies/material has numbers of materials that the namelist does not have")

@@ -63,7 +63,7 @@ def body_columns(frame: Any, names: tuple[str, ...] = BODY_COLUMNS) -> dict[str,
 
 def contact_columns(contacts: Any) -> dict[str, npt.NDArray[Any]]:
     """Columns of contacts by name, vectors as two columns."""
-    return flat({name: np.asarray(getattr(contacts, name)) for name in CONTACT_COLUMNS})
+    return flat({**{name: np.asarray(getattr(contacts, name)) for name in CONTACT_COLUMNS}, **contacts.others})
 
 
 def body_table(frame: Any) -> Any:

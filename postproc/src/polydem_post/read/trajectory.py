@@ -371,7 +371,10 @@ class Trajectory:
         kept = rows.kept(row, bodies["id"])
         if kept is not None:
             bodies = chosen_bodies(kept, bodies)
-        crossed = [name for name in ("image", "slid") if name in frames]
+        crossed = [name for name in ("image", "shear_offset") if name in frames]
+        if "slid" in frames:
+            raise ResultError(f"{segment.path}: is of an earlier revision: `frames/slid` has the name "
+                              "`frames/shear_offset` today; run the scene again")
         columns = {name: rows.column(name, row) for name in (*GROWING, *crossed)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
         jump = self._jump(bodies["cell_size"][1], float(segment.times[row])) if "shift" in frames else 0.0
@@ -401,8 +404,10 @@ class Trajectory:
             low, high = (int(each) for each in group["start"][row : row + 2])
             is_new = int(file.attrs["schema_version"]) >= CONTACT_LAYOUT
             names = [name for name in CONTACT_FIELDS if is_new or name not in NEW_CONTACT_FIELDS]
-            columns = {name: group[name][low:high] for name in names}
+            others = [name for name in group if name not in (*CONTACT_FIELDS, "start")]
+            columns = {name: group[name][low:high] for name in (*names, *others)}
             shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else [])) for name in names}
+            shapes |= {name: (high - low, *group[name].shape[1:]) for name in others}
             insist(segment.path, "contacts", columns, shapes)
         if self._shift is not None:
             columns["point"] = columns["point"] + self._shift

@@ -42,7 +42,7 @@ contains
       associate (unused_pairs => pairs)
       end associate
       self%stage = stage_last
-      self%needs_twist = .true.
+      self%needs_couple = .true.
       self%damps_tilts = .true.
       self%share = settings%tilt_damping
    end subroutine configure
@@ -52,7 +52,7 @@ contains
       class(tilt_damping_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
-      !> Contacts with their dashpots; `twist` changes
+      !> Contacts with their dashpots; `couple` changes
       type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
       real(wp) :: limit, torque
@@ -64,7 +64,7 @@ contains
          torque = -(self%share/12.0_wp)*block%dashpot(c)*block%length(c)**2 &
             *(block%angular_velocity(c, 1) - block%angular_velocity(c, 2))
          limit = 0.5_wp*block%length(c)*max(0.0_wp, block%normal_force(c))
-         block%twist(c) = block%twist(c) + max(-limit, min(limit, torque))
+         block%couple(c) = block%couple(c) + max(-limit, min(limit, torque))
       end do
    end subroutine add
 

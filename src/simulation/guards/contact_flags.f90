@@ -1,5 +1,5 @@
-!> Flags contacts that are deep, degenerate or stiff, and detects bodies that pass through each other: the centre of one
-!> body is inside the other, or the direction of their contact reverses.
+!> Flags contacts beyond the limits of the guards: those that are deep, degenerate or stiff. Detects bodies that pass
+!> through each other: the centre of one body is inside the other, or the direction of their contact reverses.
 !>
 !> The overlap pushes a body that crosses a thin body back at first. Later the overlap has no direction, and finally it
 !> pushes the body out on the far side. The direction therefore turns by more than a right angle from one step to the
@@ -14,15 +14,12 @@ module polydem_contact_flags
    use polydem_bodies, only: bodies_t
    use polydem_cell, only: nearest_copy
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
-   use polydem_settings, only: guards_settings_t
-   use polydem_strings, only: to_text
    implicit none
    private
-   public :: flag_limits_t, new_flag_limits, test_block, passing_text, packed_direction, is_reversed, &
-      centre_inside, least_depth
+   public :: flag_limits_t, flag_deeper, test_block, packed_direction, is_reversed, centre_inside, least_depth, &
+      former_direction
 
    !> Minimum depth of the tested contacts, as a fraction of the thickness of the thinner piece
    real(wp), parameter :: least_depth = 0.0625_wp
@@ -40,25 +37,23 @@ module polydem_contact_flags
       integer :: column = 0
    end type flag_limits_t
 
+   !> Column of the contact history with the directions of the last step
+   type(history_kind_t), parameter :: former_direction = &
+      history_kind_t('direction', '1', 'direction at the last step, packed')
+
 contains
 
-   !> Set up the limits for the present bodies.
-   subroutine new_flag_limits(limits, settings, bodies, column)
-      !> Limits beyond which a contact is flagged
-      type(flag_limits_t), intent(out) :: limits
-      type(guards_settings_t), intent(in) :: settings
+   !> Flag contacts that are deeper than a share of the thickness of the thinner piece, beside those flagged already.
+   subroutine flag_deeper(limits, share, bodies)
+      type(flag_limits_t), intent(inout) :: limits
+      !> Share of the thickness of the thinner piece
+      real(wp), intent(in) :: share
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
-      !> Column of the contact history with the directions of the last step; 0 if there is none
-      integer, intent(in) :: column
 
-      limits%column = column
-      if (settings%overlap /= 'off') limits%least_depth = settings%overlap_limit
-      if (settings%tunnelling /= 'off') limits%least_depth = min(limits%least_depth, least_depth)
-      if (limits%least_depth < huge(1.0_wp)) then
-         limits%shallow = min(limits%shallow, 0.999_wp*limits%least_depth*minval(bodies%thickness))
-      end if
-   end subroutine new_flag_limits
+      limits%least_depth = min(limits%least_depth, share)
+      limits%shallow = min(limits%shallow, 0.999_wp*limits%least_depth*minval(bodies%thickness))
+   end subroutine flag_deeper
 
    !> Test the contacts of a block, and store their directions.
    subroutine test_block(limits, bodies, block, history, flagged, any_flagged, passing_pair)
@@ -153,52 +148,6 @@ contains
          if (.not. passes) passes = centre_inside(bodies, bodies%radius, j, i)
       end associate
    end function passes
-
-   !> Message about a contact whose bodies pass through each other
-   function passing_text(bodies, contacts, radius, c, shorter_step) result(text)
-      !> Bodies at the end of the step
-      type(bodies_t), intent(in) :: bodies
-      !> Contacts of the step
-      type(contacts_t), intent(in) :: contacts
-      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
-      real(wp), intent(in) :: radius(:)
-      !> Index of the contact
-      integer(ip), intent(in) :: c
-      !> Clause that says how to shorten the time step
-      character(len=*), intent(in) :: shorter_step
-      character(len=:), allocatable :: text
-
-      associate (i => contacts%first(c), j => contacts%second(c))
-         if (bodies%pieces%most > 1_ip) then
-            text = 'of the contact of the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
-               to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
-               to_text(bodies%position(2, i) + contacts%arm_first(2, c))// &
-               ') m a piece has its centre inside the other, or the direction changed by more than 90 degrees'
-         else if (centre_inside(bodies, radius, i, j)) then
-            text = centre_text(i, j)
-         else if (centre_inside(bodies, radius, j, i)) then
-            text = centre_text(j, i)
-         else
-            text = 'the contact of the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
-               to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
-               to_text(bodies%position(2, i) + contacts%arm_first(2, c))// &
-               ') m changed its direction by more than 90 degrees in the step'
-         end if
-      end associate
-      text = text//': one may pass through the other. Increase the stiffness, use thicker or slower bodies, or '// &
-         shorter_step
-
-   contains
-
-      function centre_text(s, other) result(words)
-         integer(ip), intent(in) :: s, other
-         character(len=:), allocatable :: words
-
-         words = 'the centre of body '//to_text(bodies%id(s))//' at ('//to_text(bodies%position(1, s))//', '// &
-            to_text(bodies%position(2, s))//') m is inside body '//to_text(bodies%id(other))
-      end function centre_text
-
-   end function passing_text
 
    !> Whether the centre of a piece is inside a piece of another body
    pure logical function piece_inside(bodies, s, other, piece, of_other) result(inside)

@@ -1,5 +1,5 @@
-!> Warnings about what is asked of a wall that has vanished: to bear a load, to move, to bound a sample.
-module polydem_vanished_walls
+!> Warnings about what is asked of a wall that was removed: to bear a load, to move, to bound a sample.
+module polydem_removed_walls
    use polydem_wall_warnings, only: add
    use polydem_kinds, only: wp
    use polydem_settings, only: settings_t
@@ -7,12 +7,12 @@ module polydem_vanished_walls
    use polydem_strings, only: text_t, to_text
    implicit none
    private
-   public :: warn_of_vanished
+   public :: warn_of_removed
 
 contains
 
-   !> Warn of loads and motions that begin when their wall has vanished, and of measures of walls that vanish.
-   subroutine warn_of_vanished(settings, warnings)
+   !> Warn of loads and motions that begin when their wall was removed, and of measures of walls that are removed.
+   subroutine warn_of_removed(settings, warnings)
       type(settings_t), intent(in) :: settings
       !> The warnings so far
       type(text_t), allocatable, intent(inout) :: warnings(:)
@@ -45,7 +45,7 @@ contains
       do j = 1, size(settings%sample%ends)
          call measure(settings, 'sample', '', 'ends', settings%sample%ends(j)%text, warnings)
       end do
-   end subroutine warn_of_vanished
+   end subroutine warn_of_removed
 
    !> Warn if something begins when its wall is not there any more.
    subroutine begin(settings, group, name, wall, start, warnings)
@@ -56,7 +56,7 @@ contains
       real(wp), intent(in) :: start
       type(text_t), allocatable, intent(inout) :: warnings(:)
 
-      associate (time => vanishing_time(settings, wall))
+      associate (time => removal_time(settings, wall))
          if (.not. time > 0.0_wp .or. start < time) return
          call add(warnings, place_of(settings, group//'.'//name, 'start')//': &'//group//' '//name//' begins at '// &
                   to_text(start, 3)//' s, but its wall '//wall//' has vanished at '//to_text(time, 3)//' s: it '// &
@@ -64,22 +64,22 @@ contains
       end associate
    end subroutine begin
 
-   !> Warn if a quantity is measured from a wall that vanishes.
+   !> Warn if a quantity is measured from a wall that is removed.
    subroutine measure(settings, group, name, key, wall, warnings)
       type(settings_t), intent(in) :: settings
       !> Group, name of the instance behind a dot if it has one, key, and the wall
       character(len=*), intent(in) :: group, name, key, wall
       type(text_t), allocatable, intent(inout) :: warnings(:)
 
-      associate (time => vanishing_time(settings, wall))
+      associate (time => removal_time(settings, wall))
          if (time > 0.0_wp) call add(warnings, place_of(settings, group//name, key)//': '''//key//''' in &'// &
             trim(group//' '//name(2:))//' names the wall '//wall//', which vanishes at '//to_text(time, 3)//' s: '// &
             'what is measured from it then is meaningless')
       end associate
    end subroutine measure
 
-   !> Time at which a wall vanishes [s]; 0: never
-   pure real(wp) function vanishing_time(settings, wall) result(time)
+   !> Time at which a wall is removed [s]; 0: never
+   pure real(wp) function removal_time(settings, wall) result(time)
       type(settings_t), intent(in) :: settings
       !> Name of the wall
       character(len=*), intent(in) :: wall
@@ -89,6 +89,6 @@ contains
       do k = 1, size(settings%wall)
          if (settings%wall(k)%name == wall) time = settings%wall(k)%vanish_at
       end do
-   end function vanishing_time
+   end function removal_time
 
-end module polydem_vanished_walls
+end module polydem_removed_walls
