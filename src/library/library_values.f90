@@ -75,7 +75,7 @@ contains
          case ('threads')
             value = int(self%threads, c_long)
          case ('is_over')
-            value = merge(1_c_long, 0_c_long, is_over(self%run))
+            value = merge(1_c_long, 0_c_long, is_over(self%run) .and. .not. allocated(self%failure))
          case default
             call raise(e%error, input_error, 'there is no whole number "'//fortran_text(name)//'"')
          end select
@@ -151,9 +151,11 @@ contains
       integer :: k
 
       text = ''
-      if (.not. allocated(row%name)) return
-      do k = 1, size(row%name)
-         text = text//trim(row%name(k))//achar(9)//trim(row%unit(k))//achar(9)//trim(row%meaning(k))//new_line('a')
+      if (.not. allocated(row%label)) return
+      do k = 1, size(row%label)
+         associate (label => row%label(k))
+            text = text//trim(label%name)//achar(9)//trim(label%unit)//achar(9)//trim(label%meaning)//new_line('a')
+         end associate
       end do
    end function lines_of
 

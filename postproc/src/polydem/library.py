@@ -7,7 +7,7 @@ import os
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import cache
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -96,7 +96,7 @@ class Handle:
     """A simulation of the library, until it is closed."""
 
     def __init__(self, pointer: int):
-        self.pointer: Optional[c_void_p] = c_void_p(pointer)
+        self.pointer: c_void_p | None = c_void_p(pointer)
 
     @property
     def open(self) -> c_void_p:
@@ -120,7 +120,7 @@ class Handle:
         call("text", self.open, name.encode(), buffer, size)
         return buffer.value.decode(errors="replace")
 
-    def array(self, name: str) -> Optional[npt.NDArray[Any]]:
+    def array(self, name: str) -> npt.NDArray[Any] | None:
         """A copy of an array, (rows) or (rows, 2); None: this simulation does not have it."""
         shape = (c_long * 2)()
         kind = call("find_array", self.open, name.encode(), shape)

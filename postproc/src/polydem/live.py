@@ -69,6 +69,7 @@ def live_frame(handle: Handle, settings: Any, source: LiveSource) -> Any:
     from polydem_post.read.frames import Frame
     from polydem_post.read.trajectory import chosen_bodies
 
+    cell: dict[str, Any] = {}
     columns: dict[str, Any] = {name: _column(handle, name) for name in COLUMNS}
     columns["fixed"] = _column(handle, "fixed").astype(bool)
     columns["shape"] = _column(handle, "vertex")
@@ -81,9 +82,11 @@ def live_frame(handle: Handle, settings: Any, source: LiveSource) -> Any:
         found = handle.array(f"bodies/{name}")
         if found is not None:
             columns[name] = found
-    cell = {name: handle.array(f"cell/{name}") for name in ("low", "size", "shift", "jump")}
-    named = {f"cell_{name}": cell[name] for name in ("low", "size") if cell[name] is not None}
-    values = {name: float(cell[name][0]) for name in ("shift", "jump") if cell[name] is not None}
+    for name in ("low", "size", "shift", "jump"):
+        found = handle.array(f"cell/{name}")
+        if found is not None:
+            cell[f"cell_{name}" if len(found) == 2 else name] = found if len(found) == 2 else float(found[0])
     names = tuple(settings.get("material", {})) if "material" in columns else ()
+    kept = chosen_bodies(_kept(handle), columns)
     return Frame(step=handle.integer("step"), time=handle.real("time"), material_names=names, _source=source,
-                 **chosen_bodies(_kept(handle), columns), **named, **values)
+                 **kept, **cell)

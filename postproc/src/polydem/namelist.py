@@ -39,7 +39,7 @@ def write_namelist(groups: Mapping[str, Any]) -> str:
         instances = [{"name": name, **each} for name, each in entries.items() if isinstance(each, Mapping)]
         if instances and len(instances) != len(entries):
             raise InputError(f"the group &{group} mixes entries and instances")
-        for each in instances or [entries]:
+        for each in instances or [dict(entries)]:
             lines.append(f"&{group}")
             lines += [f"   {key} = {to_text(value)}" for key, value in each.items()]
             lines.append("/")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Mapping
 from ctypes import byref, c_char_p, c_void_p
 from os import PathLike, fspath
 from types import MappingProxyType, TracebackType
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -97,11 +96,11 @@ class Simulation:
     interrupted and can be resumed. Values are copies. One thread at a time may use a simulation.
     """
 
-    def __init__(self, source: Union[str, PathLike[str], Mapping[str, Any]],
-                 overrides: Optional[Mapping[str, Any]] = None, *, threads: int = 1,
-                 folder: Union[str, PathLike[str], None] = None, force: bool = False, resume: bool = False):
+    def __init__(self, source: str | PathLike[str] | Mapping[str, Any],
+                 overrides: Mapping[str, Any] | None = None, *, threads: int = 1,
+                 folder: str | PathLike[str] | None = None, force: bool = False, resume: bool = False):
         self._observers: list[tuple[int, Observer]] = []
-        self._stop: Optional[str] = None
+        self._stop: str | None = None
         if force and resume:
             raise InputError("force starts the run again, resume goes on with it: choose one")
         if (force or resume) and folder is None:
@@ -119,8 +118,8 @@ class Simulation:
         """The simulation."""
         return self
 
-    def __exit__(self, kind: Optional[type[BaseException]], error: Optional[BaseException],
-                 trace: Optional[TracebackType]) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
         """Close it."""
         self.close()
 
@@ -141,8 +140,8 @@ class Simulation:
 
     # --- steps --------------------------------------------------------------------------------------------------------
 
-    def run(self, steps: Optional[int] = None, *, until: Optional[float] = None,
-            duration: Optional[float] = None) -> int:
+    def run(self, steps: int | None = None, *, until: float | None = None,
+            duration: float | None = None) -> int:
         """Run through all stages; return the number of steps done.
 
         Without arguments to the end of the run; else `steps` steps, `duration` seconds of simulated time from now, or
@@ -168,7 +167,7 @@ class Simulation:
             self._advance_to(end)
         return self.step - begin
 
-    def _advance_to(self, end: Optional[int]) -> None:
+    def _advance_to(self, end: int | None) -> None:
         """Advance to the next call of an observer, or to a step, at most for a moment; call what is due."""
         now = self.step
         last = self.n_steps if end is None else min(end, self.n_steps)
@@ -180,7 +179,7 @@ class Simulation:
             if step % interval == 0 and step > now:
                 observer(self)
 
-    def every(self, steps: Optional[int] = None, *, seconds: Optional[float] = None) -> Callable[[Observer], Observer]:
+    def every(self, steps: int | None = None, *, seconds: float | None = None) -> Callable[[Observer], Observer]:
         """A decorator: call a function with the simulation after each step whose number is a multiple.
 
         `seconds` is rounded to a whole number of steps.
@@ -202,7 +201,7 @@ class Simulation:
         self._stop = str(reason)
 
     @property
-    def stopped(self) -> Optional[str]:
+    def stopped(self) -> str | None:
         """Why the last `run` returned early; None: it did not."""
         return self._stop
 
@@ -306,7 +305,7 @@ class Simulation:
         return other
 
 
-def _name_and_text(source: Union[str, PathLike[str], Mapping[str, Any]]) -> tuple[str, Optional[str]]:
+def _name_and_text(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[str, str | None]:
     """Path and no text of a namelist, or its name in messages and its text."""
     if isinstance(source, Mapping):
         return "dictionary", write_namelist(source)
