@@ -86,6 +86,57 @@ contains
       real(wp), allocatable, intent(inout) :: reals(:)
       type(error_t), allocatable, intent(inout) :: error
 
+      associate (n => bodies%n)
+         select case (name)
+         case ('mass')
+            reals = bodies%mass(:n)
+         case ('inertia')
+            reals = bodies%inertia(:n)
+         case ('position')
+            call flatten(bodies%position(:, :n))
+         case ('velocity')
+            call flatten(bodies%velocity(:, :n))
+         case ('force')
+            call flatten(bodies%force(:, :n))
+         case ('vertex')
+            call flatten(bodies%pieces%vertex(:, :bodies%pieces%vertex_start(n + 1_ip) - 1_ip))
+         case ('angle')
+            reals = bodies%angle(:n)
+         case ('angular_velocity')
+            reals = bodies%angular_velocity(:n)
+         case ('torque')
+            reals = bodies%torque(:n)
+         case ('shear_offset')
+            if (allocated(bodies%shear_offset)) reals = bodies%shear_offset(:n)
+         case default
+            call find_integers_of_bodies(name, bodies, width, integers, error)
+         end select
+      end associate
+
+   contains
+
+      !> Copy vectors.
+      subroutine flatten(vectors)
+         !> The vectors, (2, row)
+         real(wp), intent(in) :: vectors(:, :)
+
+         width = 2_lp
+         reals = reshape(vectors, [size(vectors)])
+      end subroutine flatten
+
+   end subroutine find_of_bodies
+
+   !> Copy a column of whole numbers of the bodies.
+   subroutine find_integers_of_bodies(name, bodies, width, integers, error)
+      !> Name of the column
+      character(len=*), intent(in) :: name
+      type(bodies_t), intent(in) :: bodies
+      !> Number of values per row
+      integer(lp), intent(inout) :: width
+      !> Allocated if the bodies have the column
+      integer(lp), allocatable, intent(inout) :: integers(:)
+      type(error_t), allocatable, intent(inout) :: error
+
       associate (n => bodies%n, pieces => bodies%pieces)
          select case (name)
          case ('id')
@@ -103,43 +154,11 @@ contains
          case ('image')
             width = 2_lp
             if (allocated(bodies%image)) integers = reshape(transpose(int(bodies%image(:n, :), lp)), [2*n])
-         case ('mass')
-            reals = bodies%mass(:n)
-         case ('inertia')
-            reals = bodies%inertia(:n)
-         case ('position')
-            call flatten(bodies%position(:, :n))
-         case ('velocity')
-            call flatten(bodies%velocity(:, :n))
-         case ('force')
-            call flatten(bodies%force(:, :n))
-         case ('vertex')
-            call flatten(pieces%vertex(:, :pieces%vertex_start(n + 1_ip) - 1_ip))
-         case ('angle')
-            reals = bodies%angle(:n)
-         case ('angular_velocity')
-            reals = bodies%angular_velocity(:n)
-         case ('torque')
-            reals = bodies%torque(:n)
-         case ('shear_offset')
-            if (allocated(bodies%shear_offset)) reals = bodies%shear_offset(:n)
          case default
             call raise_unknown('bodies/'//name, error)
          end select
       end associate
-
-   contains
-
-      !> Copy vectors.
-      subroutine flatten(vectors)
-         !> The vectors, (2, row)
-         real(wp), intent(in) :: vectors(:, :)
-
-         width = 2_lp
-         reals = reshape(vectors, [size(vectors)])
-      end subroutine flatten
-
-   end subroutine find_of_bodies
+   end subroutine find_integers_of_bodies
 
    !> Copy a column of the contacts.
    subroutine find_of_contacts(name, bodies, contacts, width, integers, reals, error)

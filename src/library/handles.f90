@@ -4,15 +4,16 @@
 !> of OpenMP threads of the caller is put back when a call leaves.
 module polydem_handles
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_long, c_null_char, c_ptr
-   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+   use omp_lib, only: omp_get_max_threads, omp_init_lock, omp_lock_kind, omp_set_num_threads, omp_test_lock, &
+      omp_unset_lock
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: lp, wp
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    implicit none
    private
-   public :: error_handle_t, simulation_handle_t, snapshot_t, enter, leave, find_error, fortran_text, give_text
+   public :: error_handle_t, simulation_handle_t, snapshot_t, own, enter, leave, find_error, fortran_text, give_text
 
    !> What stands behind a `polydem_error`
    type :: error_handle_t
@@ -30,12 +31,12 @@ module polydem_handles
       integer :: threads = 1
       !> Why the run has stopped before its end; unallocated if it goes on or has ended
       type(error_t), allocatable :: failure
-      !> The array that was asked for last: its name, its values, and the numbers of values per row
-      character(len=:), allocatable :: name
+      !> Values of the array that was asked for last, if they are real numbers
       real(wp), allocatable :: reals(:)
+      !> Likewise, if they are whole numbers
       integer(lp), allocatable :: integers(:)
-      !> Number of calls that are in the simulation
-      integer, private :: n_inside = 0
+      !> Held by the call that is in the simulation
+      integer(omp_lock_kind), private :: lock
       !> Identifier of the process that made it
       integer(c_int), private :: process = -1_c_int
       !> Number of OpenMP threads of the caller
@@ -63,10 +64,23 @@ module polydem_handles
 
 contains
 
+   !> Give a new handle its process and its lock.
+   subroutine own(made, threads)
+      !> The handle
+      type(simulation_handle_t), intent(inout) :: made
+      !> Number of OpenMP threads
+      integer, intent(in) :: threads
+
+      made%threads = max(1, threads)
+      made%process = c_getpid()
+      call omp_init_lock(made%lock)
+   end subroutine own
+
    !> Find the error behind a handle, and clear it. A null handle gives a null pointer.
    subroutine find_error(handle, found)
       !> A `polydem_error`
       type(c_ptr), intent(in) :: handle
+      !> The error
       type(error_handle_t), pointer, intent(out) :: found
 
       nullify (found)
@@ -79,10 +93,10 @@ contains
    subroutine enter(handle, found, error)
       !> A `polydem_simulation`
       type(c_ptr), intent(in) :: handle
+      !> The simulation
       type(simulation_handle_t), pointer, intent(out) :: found
       !> Allocated if the simulation cannot be used now
       type(error_t), allocatable, intent(inout) :: error
-      integer :: n_inside
 
       nullify (found)
       if (.not. c_associated(handle)) then
@@ -90,19 +104,13 @@ contains
          return
       end if
       call c_f_pointer(handle, found)
-      if (found%process < 0_c_int) found%process = c_getpid()
-      !$omp atomic capture
-      found%n_inside = found%n_inside + 1
-      n_inside = found%n_inside
-      !$omp end atomic
-      if (n_inside > 1) then
-         call raise(error, input_error, 'another thread uses the simulation; each thread needs its own')
-      else if (found%process /= c_getpid()) then
+      if (found%process /= c_getpid()) then
          call raise(error, input_error, 'the simulation belongs to the process that this one was forked from; make '// &
                     'another one here')
+      else if (.not. omp_test_lock(found%lock)) then
+         call raise(error, input_error, 'another thread uses the simulation; each thread needs its own')
       end if
       if (allocated(error)) then
-         call step_out(found)
          nullify (found)
          return
       end if
@@ -112,22 +120,16 @@ contains
 
    !> Leave a simulation.
    subroutine leave(found)
+      !> The simulation, entered
       type(simulation_handle_t), intent(inout) :: found
 
       call omp_set_num_threads(found%former_threads)
-      call step_out(found)
+      call omp_unset_lock(found%lock)
    end subroutine leave
-
-   !> One call less is in the simulation.
-   subroutine step_out(found)
-      type(simulation_handle_t), intent(inout) :: found
-
-      !$omp atomic update
-      found%n_inside = found%n_inside - 1
-   end subroutine step_out
 
    !> The text of a C string; empty for a null pointer
    function fortran_text(text) result(copy)
+      !> The C string
       type(c_ptr), intent(in) :: text
       character(len=:), allocatable :: copy
       character(kind=c_char), pointer :: letters(:)
@@ -145,6 +147,7 @@ contains
 
    !> Copy a text to a C string of limited size, which ends with a null character; give its whole length.
    function give_text(text, buffer, size) result(length)
+      !> The text
       character(len=*), intent(in) :: text
       !> Where it goes; may be null if `size` is 0
       type(c_ptr), intent(in) :: buffer

@@ -1,12 +1,12 @@
 !> The C interface, whose contract is polydem.h: errors, and making, advancing, copying and ending simulations.
 module polydem_library
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_int, c_loc, c_long, &
-      c_null_char, c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_loc, c_long, c_null_ptr, &
+      c_ptr
    use polydem_build_info, only: program_version
    use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t, input_error, raise, stopped_early
-   use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, give_text, leave, simulation_handle_t, &
-      snapshot_t
+   use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, give_text, leave, own, &
+      simulation_handle_t, snapshot_t
    use polydem_kinds, only: dp
    use polydem_read_settings, only: read_settings, read_settings_text
    use polydem_run_simulation, only: end_run, interrupt_run, is_over, start_run, take_step
@@ -17,17 +17,17 @@ module polydem_library
    !> Values of `mode` in `polydem_new_simulation`
    integer(c_int), parameter :: mode_force = 1_c_int, mode_continue = 2_c_int
 
-   !> The version as a C string
-   character(kind=c_char), target, save :: version(len(program_version) + 1)
-
 contains
 
    !> Version of polydem.
-   function polydem_version() bind(C) result(text)
-      type(c_ptr) :: text
+   function polydem_version(buffer, size) bind(C) result(length)
+      !> Where it goes
+      type(c_ptr), value :: buffer
+      !> Room in characters
+      integer(c_long), value :: size
+      integer(c_long) :: length
 
-      version = transfer(program_version//c_null_char, version)
-      text = c_loc(version)
+      length = give_text(program_version, buffer, size)
    end function polydem_version
 
    !> Make an error handle.
@@ -107,7 +107,7 @@ contains
       call find_error(error, e)
       if (.not. associated(e)) return
       allocate (made)
-      made%threads = max(1, int(threads))
+      call own(made, int(threads))
       made%run%options%is_guest = .true.
       made%run%options%has_files = c_associated(folder)
       made%run%options%continues = mode == mode_continue
@@ -313,7 +313,7 @@ contains
       if (.not. associated(self)) return
       allocate (made)
       made%settings = self%settings
-      made%threads = self%threads
+      call own(made, self%threads)
       if (allocated(self%failure)) made%failure = self%failure
       made%run%options = self%run%options
       made%run%options%has_files = .false.

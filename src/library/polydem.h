@@ -28,11 +28,12 @@ enum { POLYDEM_NEW = 0, POLYDEM_FORCE = 1, POLYDEM_CONTINUE = 2 };
 /* Kinds of arrays */
 enum { POLYDEM_ABSENT = 0, POLYDEM_INTEGERS = 1, POLYDEM_REALS = 2 };
 
-/* Version of polydem, as "0.1.0" */
-const char *polydem_version(void);
+/* A text is copied to a buffer and cut to `size` characters, its end included; its whole length is returned. */
 
-/* Make an error handle, ask for its code, copy its message, delete it. The message is cut to `size` characters, its
- * end included; its whole length is returned. */
+/* Version of polydem, as "0.1.0" */
+long polydem_version(char *buffer, long size);
+
+/* Make an error handle, ask for its code, copy its message, delete it. */
 polydem_error polydem_new_error(void);
 void polydem_delete_error(polydem_error *error);
 int polydem_error_code(polydem_error error);

@@ -66,7 +66,8 @@ contains
 
       associate (s => run%simulation)
          needs_table = run%options%tabulates
-         needs_table = needs_table .or. s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
+         needs_table = needs_table .or. s%settings%output%contacts .and. &
+            is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
          if (run%series_steps > 0.0_dp) needs_table = needs_table .or. &
             is_due(s%step + 1_lp, s%n_steps, run%series_steps) .or. is_line_due(run, s%step + 1_lp)
          if (s%stages%number > 0_ip) needs_table = needs_table .or. needs_for_stage(s, s%step + 1_lp)

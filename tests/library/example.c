@@ -38,10 +38,11 @@ int main(int argc, char **argv)
         if (position[2 * k + 1] > highest) highest = position[2 * k + 1];
     free(position);
 
-    char hash[17];
+    char hash[17], version[20];
+    polydem_version(version, sizeof version);
     polydem_text(error, simulation, "state_hash", hash, sizeof hash);
     check(error);
-    printf("%s %ld %.17g %s\n", polydem_version(), polydem_integer(error, simulation, "step"), highest, hash);
+    printf("%s %ld %.17g %s\n", version, polydem_integer(error, simulation, "step"), highest, hash);
 
     polydem_delete_simulation(error, &simulation);
     check(error);

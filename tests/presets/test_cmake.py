@@ -127,6 +127,32 @@ class Install(Scene):
                 self.assertIn(f"--{option}" if "fish" not in place else f"-l {option}", text)
                 self.assertNotIn(other, text)
 
+    def test_other_programs_find_the_installed_library(self):
+        self.assertEqual(call(CMAKE, "--install", BUILD, "--prefix", self.folder / "usr")[0], 0)
+        example, scene = SOURCES / "tests/library/example.c", SOURCES / "inputs/first.nml"
+        (self.folder / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.25)\nproject(other LANGUAGES C)\nfind_package(polydem 0.1 REQUIRED)\n"
+            f"add_executable(other {example})\ntarget_link_libraries(other PRIVATE polydem::polydem)\n",
+            encoding="utf-8")
+        code, output, message = call(CMAKE, "-S", self.folder, "-B", self.folder / "b",
+                                     f"-DCMAKE_PREFIX_PATH={self.folder / 'usr'}")
+        self.assertEqual(code, 0, output + message)
+        code, output, message = call(CMAKE, "--build", self.folder / "b")
+        self.assertEqual(code, 0, output + message)
+        expected = call(BUILD / "tests/library/library_example_c", scene, "20")
+        self.assertEqual(expected[0], 0)
+        self.assertEqual(call(self.folder / "b/other", scene, "20"), expected)
+        [listed] = (self.folder / "usr").rglob("polydem.pc")
+        words = dict(re.findall(r"^(Libs|Cflags|prefix|libdir|includedir)[:=] *(.*)$", listed.read_text("utf-8"), re.MULTILINE))
+        words["prefix"] = words["prefix"].replace("${pcfiledir}", str(listed.parent))
+        for name in ("libdir", "includedir", "prefix"):
+            words = {key: text.replace(f"${{{name}}}", words[name]) for key, text in words.items()}
+        code, _, message = call("cc", example, *words["Cflags"].split(), *words["Libs"].split(), "-o",
+                                self.folder / "plain")
+        self.assertEqual(code, 0, message)
+        own = {**os.environ, "LD_LIBRARY_PATH": words["libdir"]}
+        self.assertEqual(call(self.folder / "plain", scene, "20", env=own), expected)
+
     @unittest.skipUnless(shutil.which("dpkg-deb"), "no dpkg-deb: nothing can be packed")
     def test_a_package_has_the_program_with_its_libraries_as_dependencies(self):
         code, output, message = call(pathlib.Path(CMAKE).with_name("cpack"), "-G", "DEB", "-B", self.folder, cwd=BUILD)

@@ -20,10 +20,10 @@ TOP_LEVEL = FOLDERS | {".ci", ".editorconfig", ".fortitude.toml", ".fprettify.rc
 FORBIDDEN = [(re.compile(pattern), re.compile(allowed), message) for pattern, allowed, message in (
     (r"^(if *\(.*\) *)?((error +)?stop\b(?! *[=%(])|call +(exit|abort)\b)", "^src/app/",
      "only the programs stop: by their end in src/app"),
-    (r"\bcall +omp_set_num_threads\b", "^src/(app|laboratory|run)/",
-     "the folders app, laboratory and run set the threads"),
+    (r"\bcall +omp_set_num_threads\b", "^src/(app|laboratory|library|run)/",
+     "the folders app, laboratory, library and run set the threads"),
     (r"^(save|data)\b(?! *[=%(])|^[^:]*, *save\b[^:]*::", "^$", "no save, no data: state lives in arguments"),
-    (r"^[^:]*, *pointer\b[^:]*::", "^src/platform/", "no pointers: use allocatables and integer links"),
+    (r"^[^:]*, *pointer\b[^:]*::", "^src/(platform|library)/", "no pointers: use allocatables and integer links"),
     (r"(?<!\w)settings(%\w+(\([^()]*\))?)+ *=(?![=>])|\btype *\( *settings_t *\) *, *intent *\( *(in)?out *\)",
      "^src/config/", "settings do not change once they are read"),
     (r"\bgo *to\b", "^$", "go to is not used here"),

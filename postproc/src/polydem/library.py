@@ -19,7 +19,7 @@ NAME = "libpolydem.so.0"
 
 #: Result and arguments of each function, after the error handle where it has one
 WITHOUT_ERROR: dict[str, tuple[Any, list[Any]]] = {
-    "version": (c_char_p, []),
+    "version": (c_long, [c_char_p, c_long]),
     "new_error": (c_void_p, []),
     "delete_error": (None, [POINTER(c_void_p)]),
     "error_code": (c_int, [c_void_p]),
@@ -89,7 +89,9 @@ def call(name: str, *arguments: Any) -> Any:
 
 def version() -> str:
     """Version of the library."""
-    return str(load().polydem_version().decode())
+    buffer = ctypes.create_string_buffer(100)
+    load().polydem_version(buffer, len(buffer))
+    return buffer.value.decode()
 
 
 class Handle:
