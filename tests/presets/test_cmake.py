@@ -143,7 +143,8 @@ class Install(Scene):
         self.assertEqual(expected[0], 0)
         self.assertEqual(call(self.folder / "b/other", scene, "20"), expected)
         [listed] = (self.folder / "usr").rglob("polydem.pc")
-        words = dict(re.findall(r"^(Libs|Cflags|prefix|libdir|includedir)[:=] *(.*)$", listed.read_text("utf-8"), re.MULTILINE))
+        words = dict(re.findall(r"^(Libs|Cflags|prefix|libdir|includedir)[:=] *(.*)$",
+                                listed.read_text("utf-8"), re.MULTILINE))
         words["prefix"] = words["prefix"].replace("${pcfiledir}", str(listed.parent))
         for name in ("libdir", "includedir", "prefix"):
             words = {key: text.replace(f"${{{name}}}", words[name]) for key, text in words.items()}
