@@ -2,10 +2,12 @@
 
 usage: compare_builds.py SOURCES FOLDER CMAKE PROGRAM [--full]
 
-Without --full only -O0 is compared, which differs most from the -O3 of the preset release. No build may
-give a warning.
+The other program is that with run-time checks (-Og) which POLYDEM_DEBUG_PROGRAM names, as ./polydem test does. Without
+it, and with --full, builds are made here: at -O0, which differs most from the -O3 of the preset release, and with
+--full at -O2. They may give no warning.
 """
 
+import os
 import pathlib
 import re
 import shutil
@@ -14,7 +16,8 @@ import sys
 
 from small_runs import RUNS, state_hash
 
-BUILDS = {"plain": "-O0", "less": "-O2"} if "--full" in sys.argv else {"plain": "-O0"}
+CHECKED = os.environ.get("POLYDEM_DEBUG_PROGRAM")
+BUILDS = {"plain": "-O0", "less": "-O2"} if "--full" in sys.argv else {} if CHECKED else {"plain": "-O0"}
 
 
 def build(sources, folder, cmake, level):
@@ -32,7 +35,7 @@ def build(sources, folder, cmake, level):
 
 def main():
     sources, folder, cmake, program = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
-    programs = {"this": program}
+    programs = {"this": program, **({"checked": CHECKED} if CHECKED else {})}
     for name, level in BUILDS.items():
         programs[name] = build(sources, folder / name, cmake, level)
     different = False

@@ -41,7 +41,8 @@ def main() -> int:
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
     environment["POLYDEM_PROGRAM"] = str(program)
     environment["POLYDEM_SOURCE_DIR"] = str(root)
-    command = [str(python), "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", str(tests), *options]
+    command = [str(python), "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider",
+               "-o", "tmp_path_retention_policy=failed", str(tests), *options]
     code = subprocess.run(command, env=environment, check=False).returncode
     return SKIPPED if code == NONE_COLLECTED else code
 

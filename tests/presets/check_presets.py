@@ -3,9 +3,8 @@
 usage: check_presets.py SOURCES FOLDER CMAKE
 
 Presets that differ only in the flags of the compiler are one, and the compiler only checks: it writes modules, but no
-code, which takes a tenth of the time. The test `equality` compiles in double precision, and refuses warnings. Of the
-preset with MPI only the layers are tried that have sources of their own there. What needs code, and the tests, is
-built by `./polydem build`.
+code, which takes a tenth of the time. Double precision has the sources of the others. Of the preset with MPI only the
+layers are tried that have sources of their own there. What needs code, and the tests, is built by `./polydem build`.
 """
 
 import json

@@ -1,8 +1,8 @@
-"""Run the tests of several processes: run_ranks.py ROOT PROGRAM [OPTION ...].
+"""Run the tests of several processes: run_ranks.py ROOT PROGRAM [FILE ...] [OPTION ...].
 
 ROOT is the repository, PROGRAM the one without MPI, POLYDEM_MPI_PROGRAM in the environment the one with it; without
-that the tests are skipped (code 77). Options are those of pytest, and --full for all combinations, which writes
-equality.md.
+that the tests are skipped (code 77). FILE is one of this folder, else all are run. Options are those of pytest, and
+--full for all combinations, which writes equality.md.
 """
 
 import os
@@ -33,8 +33,11 @@ def main() -> int:
     environment["PYTHONPATH"] = str(root / "postproc" / "src")
     environment["PYTHONDONTWRITEBYTECODE"] = "1"
     tests = Path(__file__).resolve().parent
-    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tests), str(tests)]
-    return subprocess.run([*command, *sys.argv[3:]], env=environment, check=False).returncode
+    files = [str(tests / word) for word in sys.argv[3:] if word.endswith(".py")]
+    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", "-o", "tmp_path_retention_policy=failed",
+               "--rootdir", str(tests), *(files or [str(tests)]),
+               *(word for word in sys.argv[3:] if not word.endswith(".py"))]
+    return subprocess.run(command, env=environment, check=False).returncode
 
 
 if __name__ == "__main__":

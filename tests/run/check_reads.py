@@ -13,8 +13,8 @@ call
 * all files that were there are as before, except those of a result that is continued or replaced;
 * a run can be continued, and ends with the hash of an undisturbed one; an old result is complete until then.
 
-Half of the data (--how short) must change nothing. By default the first and the last call of each kind that no verb
-before has are tried, and all calls of verbs with few. --full and the other options are those of check_writes.py.
+Half of the data (--how short) must change nothing. By default the first or the last call of each kind that no verb
+before has are tried, and without ranks a few of each verb. --full and the other options are those of check_writes.py.
 """
 
 import copy
@@ -30,8 +30,8 @@ from pathlib import Path
 
 from check_writes import WAITING, Broken, Call, attempts, execute, hash_of, main, sample, set_up
 
-#: So few calls of a verb are all tried
-FEW = 40
+#: About so many calls of each verb are tried, spread over all of them, whatever their kind
+FEW = 4
 OUTLINES = "".join(f"POLYGON ((0 {y}, 0.01 {y}, 0.01 {y + 0.01:.2f}, 0 {y + 0.01:.2f}, 0 {y}))\n"
                    for y in (0.0, 0.009, 0.018))
 #: What both scenes have: frames with contacts in several segments, a checkpoint after each step
@@ -267,6 +267,14 @@ def outcome(output):
     return hash_of(output) or output
 
 
+def in_turn(calls):
+    """The first or the last of each kind."""
+    kinds = {}
+    for call in calls:
+        kinds.setdefault(call.kind(), []).append(call)
+    return [found[-(number % 2)] for number, found in enumerate(kinds.values())]
+
+
 def try_calls(case, options, memory):
     """Let calls fail; give those that went wrong."""
     verbs = [*OF_RANKS] if options.ranks else [*VERBS, *PYTHON_VERBS]
@@ -278,7 +286,9 @@ def try_calls(case, options, memory):
         calls = [call for rank in range(options.ranks or 1) for call in case.count(verb, rank)]
         all_calls[verb] = len(calls)
         kinds = known[verb in PYTHON_VERBS]
-        chosen = calls if options.full or len(calls) <= FEW else sample(calls, kinds)
+        some = [] if options.ranks else calls[::-(-len(calls) // FEW)]
+        wanted = calls if options.full else [*in_turn(sample(calls, kinds)), *some]
+        chosen = [call for call in calls if call in wanted]
         kinds.update(call.kind() for call in calls)
         points = {(options.ranks, options.how, options.error, verb, call.rank, call.number): call
                   for call in chosen[part - 1::parts]}

@@ -1,7 +1,8 @@
 """Small runs that are interrupted at every step, or killed at calls to the system, and then continued.
 
 Rows of the series, frames and checkpoints have coprime intervals, so every one of them comes first somewhere. The
-continued run has the series.csv and the data sets of the undisturbed one, bit by bit.
+continued run has the series.csv and the data sets of the undisturbed one, bit by bit. The scenes share the steps from
+which a run goes on to its end, and the kinds of calls; with POLYDEM_FULL=1 in the environment each scene tries all.
 """
 
 import os
@@ -17,6 +18,7 @@ from check_writes import Call, sample
 
 PROGRAM = os.path.abspath(os.environ["POLYDEM_PROGRAM"])
 FAILING = os.environ.get("POLYDEM_FAILING_CALLS", "")
+FULL = bool(os.environ.get("POLYDEM_FULL"))
 
 #: Exit codes of a run, as inputs/getting_started.md lists them
 DONE, FAILED, EARLY = 0, 1, 75
@@ -105,17 +107,53 @@ def assert_equal(folder, whole):
         assert values.tobytes() == whole[1][name].tobytes(), (folder, name)
 
 
+def write_scene(end):
+    # With and without a checkpoint at the end
+    output = OUTPUT.format((".true.", ".false.")[list(ENDS).index(end) % 2])
+    Path("scene.nml").write_text(ENDS[end][0] + output, encoding="utf-8")
+
+
 @pytest.fixture(params=ENDS)
-def run(request, tmp_path, monkeypatch):
+def end(request):
+    """How the scene of a test ends."""
+    return request.param
+
+
+@pytest.fixture
+def run(end, tmp_path, monkeypatch):
     """The undisturbed run in the folder `whole`: exit code, message, contents."""
     monkeypatch.chdir(tmp_path)
-    scene, code = ENDS[request.param]
-    # With and without a checkpoint at the end
-    output = OUTPUT.format((".true.", ".false.")[list(ENDS).index(request.param) % 2])
-    Path("scene.nml").write_text(scene + output, encoding="utf-8")
+    write_scene(end)
+    code = ENDS[end][1]
     found, _, message = start("whole")
     assert found == code, message
-    return code, message, (*contents("whole"), request.param == "traffic")
+    return code, message, (*contents("whole"), end == "traffic")
+
+
+@pytest.fixture(scope="module")
+def points(tmp_path_factory):
+    """The first and the last call of each kind, by scene: each in one of the scenes that have it, in turn."""
+    folder, before = tmp_path_factory.mktemp("counted"), os.getcwd()
+    os.chdir(folder)
+    having = {}
+    for end in ENDS:
+        write_scene(end)
+        code, _, message = start("counted", LD_PRELOAD=FAILING, POLYDEM_FAIL_FOLDER=f"{folder}/counted",
+                                 POLYDEM_FAIL_LOG=f"{folder}/{end}")
+        assert code == ENDS[end][1], message
+        shutil.rmtree("counted")
+        lines = Path(end).read_text(encoding="utf-8").splitlines()
+        chosen, seen = sample([Call(0, *line.split(" ", 2)) for line in lines]), set()
+        assert len(chosen) > 20, chosen
+        for call in chosen:
+            having.setdefault((call.kind(), call.kind() in seen), []).append((end, call))
+            seen.add(call.kind())
+    os.chdir(before)
+    shared = {end: [] for end in ENDS}
+    for number, calls in enumerate(having.values()):
+        for end, call in calls if FULL else [calls[number % len(calls)]]:
+            shared[end].append(call)
+    return shared
 
 
 def finish(folder, run):
@@ -126,14 +164,15 @@ def finish(folder, run):
     assert_equal(folder, whole)
 
 
-def test_a_signal_at_every_step_changes_nothing(run):
+def test_a_signal_at_every_step_changes_nothing(run, end):
     """Finds state that a checkpoint lacks when the next frame comes before the next row, or the end before both."""
     steps = 0
     while True:
         code, _, message = start("chain", "--continue", before=ask_for_an_end)
         steps += 1
-        shutil.copytree("chain", f"from_{steps}")
-        finish(f"from_{steps}", run)
+        if FULL or steps % len(ENDS) == list(ENDS).index(end):
+            shutil.copytree("chain", f"from_{steps}")
+            finish(f"from_{steps}", run)
         if code != EARLY:
             break
         assert f"at step {steps} of" in message, message
@@ -143,19 +182,13 @@ def test_a_signal_at_every_step_changes_nothing(run):
 
 
 @pytest.mark.skipif(not FAILING, reason="the library of failing_calls.c is not there")
-def test_a_kill_at_a_call_changes_nothing(run):
+def test_a_kill_at_a_call_changes_nothing(run, end, points):
     """Before the first and the last call of each kind that changes files, a kill leaves what can be continued."""
     here = os.path.realpath(".")
-    library = {"LD_PRELOAD": FAILING, "POLYDEM_FAIL_HOW": "kill"}
-    code, _, message = start("counted", **library, POLYDEM_FAIL_FOLDER=f"{here}/counted",
-                             POLYDEM_FAIL_LOG=f"{here}/calls")
-    assert code == run[0], message
-    points = sample([Call(0, *line.split(" ", 2)) for line in Path("calls").read_text(encoding="utf-8").splitlines()])
-    assert len(points) > 20, points
-    for point in points:
+    for point in points[end]:
         folder = f"killed_{point.number}"
-        code, _, message = start(folder, **library, POLYDEM_FAIL_FOLDER=f"{here}/{folder}",
-                                 POLYDEM_FAIL_CALL=str(point.number))
+        code, _, message = start(folder, LD_PRELOAD=FAILING, POLYDEM_FAIL_HOW="kill",
+                                 POLYDEM_FAIL_FOLDER=f"{here}/{folder}", POLYDEM_FAIL_CALL=str(point.number))
         assert code == -signal.SIGKILL, (str(point), code, message)
         finish(folder, run)
         shutil.rmtree(folder)
@@ -184,11 +217,10 @@ def test_tables_are_made_again(name, code, tmp_path, monkeypatch):
     assert found == DONE, message
     expected = {table: Path("whole", table).read_bytes() for table in ("series.csv", "overlaps.csv")}
     assert all(table.count(b"\n") > 2 for table in expected.values())
-    before = ask_for_an_end if code == EARLY else None
+    found, _, message = start("sound", before=ask_for_an_end if code == EARLY else None)
+    assert found == code and is_complete("sound"), message
     for how in ("delete", "empty", "cut", "zeros", "longer"):
-        folder = f"{how}"
-        found, _, message = start(folder, before=before)
-        assert found == code and is_complete(folder), message
+        folder = shutil.copytree("sound", how)
         damage(Path(folder, name), how)
         told = subprocess.run([PROGRAM, "info", "--check", folder], capture_output=True, text=True, check=False)
         assert told.returncode != DONE and f"WRONG  {name}" in told.stdout, told

@@ -45,21 +45,27 @@ contains
       end if
       call table%show('blocks at which a stack buckles, E = 1e7', &
                       (7.837_wp/12.0_wp*1.0e7_wp*width/weight)**(1.0_wp/3.0_wp))
-      call buckle(table, 'area law', area_law)
-      call buckle(table, 'default law', '')
+      ! Quick: each law and each height once
+      call buckle(table, 'area law', area_law, [.true., thorough])
+      call buckle(table, 'default law', '', [thorough, .true.])
       call sink(table, 10_ip)
    end subroutine run_stack
 
    !> A stack below the height at which it buckles stands, and one above it falls.
-   subroutine buckle(table, name, law)
+   subroutine buckle(table, name, law, tried)
       type(table_t), intent(inout) :: table
       !> Law in words, and its entries
       character(len=*), intent(in) :: name, law
+      !> Whether the low and the high stack are tried
+      logical, intent(in) :: tried(2)
       real(wp) :: leaning
 
-      call nudge(table, 24_ip, law, leaning)
-      call table%expect_absolute('24 blocks, E = 1e7, '//name//', nudged: the top leans after 2 s by [m]', 0.0_wp, &
-                                 leaning, 0.1_wp*width)
+      if (tried(1)) then
+         call nudge(table, 24_ip, law, leaning)
+         call table%expect_absolute('24 blocks, E = 1e7, '//name//', nudged: the top leans after 2 s by [m]', 0.0_wp, &
+                                    leaning, 0.1_wp*width)
+      end if
+      if (.not. tried(2)) return
       call nudge(table, 36_ip, law, leaning)
       call table%expect_true('36 blocks, E = 1e7, '//name//', nudged: the top leans by a width within 2 s', &
                              leaning > width)

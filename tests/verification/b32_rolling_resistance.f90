@@ -30,14 +30,16 @@ module b32_rolling_resistance
 contains
 
    !> Begin to roll, roll, stop, oscillate.
-   subroutine run_rolling_resistance(table)
+   subroutine run_rolling_resistance(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      integer, parameter :: corners(3) = [many, 64, 16]
+      !> Whether to roll three polygons instead of two
+      logical, intent(in) :: thorough
+      integer, parameter :: corners(3) = [many, 16, 64]
       integer :: k
 
       call table%begin('B32', 'rolling resistance of polygons of radius 1 cm')
-      do k = 1, size(corners)
+      do k = 1, merge(3, 2, thorough)
          call roll_off(table, corners(k))
       end do
       call hold(table)

@@ -134,7 +134,7 @@ contains
       case ('B31')
          call run_materials(table)
       case ('B32')
-         call run_rolling_resistance(table)
+         call run_rolling_resistance(table, thorough)
       case ('B33')
          call run_controlled_cell(table, thorough)
       case ('B34')
