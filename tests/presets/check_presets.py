@@ -26,6 +26,7 @@ ONLY_CHECK = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_Fortran_FLAGS_RELEASE=-fsyn
               "-DCMAKE_Fortran_COMPILE_OBJECT=<CMAKE_Fortran_COMPILER> <DEFINES> <INCLUDES> <FLAGS> -c <SOURCE> "
               "-o <OBJECT> && touch <OBJECT>",
               "-DCMAKE_Fortran_ARCHIVE_CREATE=<CMAKE_COMMAND> -E touch <TARGET>", "-DCMAKE_Fortran_ARCHIVE_FINISH=",
+              "-DCMAKE_Fortran_CREATE_SHARED_LIBRARY=<CMAKE_COMMAND> -E touch <TARGET>",
               "-DCMAKE_Fortran_LINK_EXECUTABLE=<CMAKE_COMMAND> -E touch <TARGET>"]
 #: Layers with other sources if the program is built with MPI
 OF_MPI = ("polydem_communicator", "polydem_hdf5")
