@@ -20,7 +20,7 @@ ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive
                "OMPI_MCA_hwloc_base_binding_policy": "none", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 #: Seconds after which a run hangs: a thousand times what it takes
-PATIENCE = 120
+PATIENCE = 1200
 #: Exit code of a namelist that is refused, and of a run that a guard stops
 REFUSED, STOPPED = 2, 1
 #: What a program writes that has lost control
