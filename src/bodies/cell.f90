@@ -11,8 +11,9 @@
 !>
 !> A *stress-controlled* cell has a size that follows a stress (`polydem_cell_load`).
 module polydem_cell
-   use polydem_driven, only: driven_t, ramp_t, window_t
+   use polydem_driven, only: driven_t
    use polydem_kinds, only: ip, wp
+   use polydem_ramp, only: ramp_t, window_t
    implicit none
    private
    public :: cell_t, cell_load_t, new_cell, grow_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y, &

@@ -2,12 +2,13 @@
 module polydem_begin_run
    use polydem_broadcaster, only: broadcaster_t
    use polydem_check_ranks, only: check_ranks
+   use polydem_claim_folder, only: check_overwrite
    use polydem_errors, only: error_t
    use polydem_file_system, only: make_folder
    use polydem_initial_warnings, only: warn_of_risks
    use polydem_kinds, only: dp, ip
    use polydem_monitor, only: new_monitor
-   use polydem_open_log, only: check_overwrite, is_restart, open_log, write_overlaps
+   use polydem_open_log, only: is_restart, open_log, write_overlaps
    use polydem_output_intervals, only: choose_intervals, frames_per_segment
    use polydem_oversubscription, only: oversubscription
    use polydem_recorder, only: check_recording
@@ -59,7 +60,8 @@ contains
       logical, intent(in) :: force
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%comm%is_root()) call check_overwrite(run, force, error)
+      if (run%comm%is_root()) call check_overwrite(run%folder, force .or. run%options%continues, &
+         run%manifest, error)
       call run%comm%all_reduce_error(error)
    end subroutine check_folder
 

@@ -1,10 +1,9 @@
 !> The log of a run, and the state of previous starts, in a folder that the root rank has locked.
 module polydem_open_log
    use polydem_bodies_reader, only: read_origin
-   use polydem_checked_files, only: check_manifest
-   use polydem_claim_folder, only: claim_folder
+   use polydem_claim_folder, only: check_overwrite, claim_folder
    use polydem_description, only: describe, list_overlaps
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp
    use polydem_log_tables, only: write_header
    use polydem_provenance, only: collect_provenance
@@ -17,24 +16,9 @@ module polydem_open_log
    use polydem_wall_names, only: wall_names_text
    implicit none
    private
-   public :: check_overwrite, open_log, write_overlaps, is_restart
+   public :: open_log, write_overlaps, is_restart
 
 contains
-
-   !> Refuse to overwrite a result without --force, and to use a folder whose manifest is damaged.
-   subroutine check_overwrite(run, force, error)
-      type(run_t), intent(inout) :: run
-      !> Whether to replace an existing result
-      logical, intent(in) :: force
-      type(error_t), allocatable, intent(inout) :: error
-
-      call run%manifest%read(run%folder)
-      call check_manifest(run%manifest, error)
-      if (force .or. run%options%continues .or. .not. run%manifest%is_found) return
-      call raise(error, input_error, run%folder//' already holds a result; add --continue '// &
-                 'to resume it or --force to set it aside and start again, or choose another folder with '// &
-                 '--set output.folder=NAME')
-   end subroutine check_overwrite
 
    !> Find the state of previous starts, claim the folder, open the log and describe the run, on the root rank only.
    subroutine open_log(settings, force, run, error)
@@ -46,7 +30,7 @@ contains
       type(origin_t) :: origin
 
       ! Repeat the check: now no other run can write to the folder.
-      call check_overwrite(run, force, error)
+      call check_overwrite(run%folder, force .or. run%options%continues, run%manifest, error)
       if (allocated(error)) return
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', run%scene_hash)

@@ -3,11 +3,12 @@
 module polydem_assign_walls
    use polydem_bodies, only: bodies_t
    use polydem_check_loads, only: act_together, one_of_them
-   use polydem_driven, only: along_angle, new_window
+   use polydem_driven, only: along_angle
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion, only: motion_item_t, motion_limits_t
    use polydem_motion_factory, only: new_motion
+   use polydem_ramp, only: new_window
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_source_locations, only: place_of

@@ -4,9 +4,9 @@
 module polydem_begin_stage
    use polydem_bodies_in_cell, only: path_of
    use polydem_changed_gravity, only: change_gravity
-   use polydem_driven, only: window_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
+   use polydem_ramp, only: window_t
    use polydem_run_duration, only: longest_stage
    use polydem_run_stages, only: run_stages_t
    use polydem_settings, only: forces_settings_t, settings_t, stage_settings_t

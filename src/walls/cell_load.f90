@@ -16,9 +16,9 @@ module polydem_cell_load
    use polydem_cell, only: cell_load_t, cell_t
    use polydem_communicator, only: communicator_t
    use polydem_contact_block, only: contact_block_t
-   use polydem_driven, only: ramp_t
    use polydem_force_sums, only: contact_terms_t, of_elastic, of_normal, of_tangential, sum_x, sum_y
    use polydem_kinds, only: ip, lp, wp
+   use polydem_ramp, only: ramp_t
    use polydem_serializer, only: serializer_t
    implicit none
    private

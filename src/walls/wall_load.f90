@@ -10,12 +10,13 @@
 module polydem_wall_load
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_driven, only: along_angle, driven_t, ramp_t
+   use polydem_driven, only: along_angle, driven_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
    use polydem_kinds, only: ip, wp
    use polydem_motion, only: turn_about
    use polydem_named_values, only: named_values_t
+   use polydem_ramp, only: ramp_t
    use polydem_serializer, only: serializer_t
    use polydem_wall, only: gap, wall_t
    use polydem_wall_terms, only: force_about, wall_terms_t

@@ -2,10 +2,11 @@
 
 usage: check_recipes.py ROOT BUILD NINJA
 
-In a copy of src, each file of the folder examples goes to the place of the same name that the pages say, and diff
-blocks change the last file named before them. The copy is built as a whole, as new entries and columns change types
-that most files use, without optimisation and with warnings as errors. Its libraries are linked to try_recipes.f90, and
-its program does a run whose frames the Python package reads. All output goes to a temporary folder.
+In a copy of src, each file of the folder examples goes to the place of the same name that the pages say, and to the
+list of sources of its layer; diff blocks change the last file named before them. The copy is built as a whole, as new
+entries and columns change types that most files use, without optimisation and with warnings as errors. Its libraries
+are linked to try_recipes.f90, and its program does a run whose frames the Python package reads. All output goes to a
+temporary folder.
 """
 
 import json
@@ -74,6 +75,17 @@ def changed(text, lines):
     return text.replace(before, after)
 
 
+def list_source(path):
+    """Add a file to the sources of the layer whose folder it is in or below."""
+    folder = os.path.dirname(path)
+    while not os.path.exists(os.path.join(folder, "CMakeLists.txt")):
+        folder = os.path.dirname(folder)
+    with open(os.path.join(folder, "CMakeLists.txt"), "r+", encoding="utf-8") as stream:
+        head, rest = stream.read().split(" SOURCES\n", 1)
+        stream.seek(0)
+        stream.write(f"{head} SOURCES\n  {os.path.relpath(path, folder)}\n{rest}")
+
+
 def apply_recipes(root, copy):
     """Apply the recipes of the pages to a copy of the sources; return the files that each of them touches."""
     found = {}
@@ -89,6 +101,7 @@ def apply_recipes(root, copy):
                 if os.path.exists(target):
                     raise RecipeError(f"{path} exists already")
                 shutil.copy(os.path.join(EXAMPLES, os.path.basename(path)), target)
+                list_source(target)
                 continue
             with open(target, encoding="utf-8") as source:
                 content = changed(source.read(), lines)

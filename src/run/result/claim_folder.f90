@@ -1,7 +1,7 @@
 !> Claiming a result folder: the manifest lists the files of a run before the run writes any of them.
 module polydem_claim_folder
-   use polydem_checked_files, only: check_free
-   use polydem_errors, only: error_t
+   use polydem_checked_files, only: check_free, check_manifest
+   use polydem_errors, only: error_t, input_error, raise
    use polydem_folder_lock, only: folder_lock_t, lock_path
    use polydem_kinds, only: ip
    use polydem_manifest, only: longest_name, manifest_t
@@ -12,9 +12,27 @@ module polydem_claim_folder
    use polydem_settings, only: output_settings_t, settings_t
    implicit none
    private
-   public :: claim_folder
+   public :: check_overwrite, claim_folder
 
 contains
+
+   !> Refuse to overwrite a result, and to use a folder whose manifest is damaged. Called by the root rank only.
+   subroutine check_overwrite(folder, is_allowed, manifest, error)
+      !> Result folder
+      character(len=*), intent(in) :: folder
+      !> Whether the result is continued or replaced
+      logical, intent(in) :: is_allowed
+      !> Manifest of the folder, which is read
+      type(manifest_t), intent(inout) :: manifest
+      !> Allocated if the run must not use the folder
+      type(error_t), allocatable, intent(inout) :: error
+
+      call manifest%read(folder)
+      call check_manifest(manifest, error)
+      if (is_allowed .or. .not. manifest%is_found) return
+      call raise(error, input_error, folder//' already holds a result; add --continue to resume it or --force to '// &
+                 'set it aside and start again, or choose another folder with --set output.folder=NAME')
+   end subroutine check_overwrite
 
    !> Begin the manifest of a run, or continue that of previous starts. The folder of a result to be replaced is
    !> renamed.

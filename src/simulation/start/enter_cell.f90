@@ -3,11 +3,12 @@ module polydem_enter_cell
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_bodies_in_cell, only: add_profile, find_folds, put_into_cell, set_cell
    use polydem_cell, only: cell_t, new_cell
-   use polydem_driven, only: along_angle, new_window
+   use polydem_driven, only: along_angle
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
    use polydem_motion, only: motion_limits_t
+   use polydem_ramp, only: new_window
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: cell_settings_t, settings_t
    use polydem_simulation, only: simulation_t

@@ -1,10 +1,10 @@
 !> Conveyor: the surface of fixed bodies has a velocity, the bodies stay. Friction and dampings see it.
 module polydem_conveyor
-   use polydem_driven, only: ramp_t
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_ramp, only: ramp_t
    use polydem_settings, only: settings_t
    implicit none
    private

@@ -5,10 +5,10 @@
 !> its own, which `polydem_motion_factory` creates.
 module polydem_motion
    use polydem_bodies, only: bodies_t
-   use polydem_driven, only: window_t
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
+   use polydem_ramp, only: window_t
    use polydem_settings, only: settings_t
    implicit none
    private

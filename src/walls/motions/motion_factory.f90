@@ -1,11 +1,11 @@
 !> Factory of prescribed motions: the list of all kinds.
 module polydem_motion_factory
    use polydem_conveyor, only: conveyor_t
-   use polydem_driven, only: new_window
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: wp
    use polydem_motion, only: motion_t
    use polydem_oscillation, only: oscillation_t
+   use polydem_ramp, only: new_window
    use polydem_rotation, only: rotation_t
    use polydem_run_duration, only: number_of_stage
    use polydem_settings, only: settings_t

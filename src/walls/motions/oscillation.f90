@@ -1,11 +1,11 @@
 !> Oscillation of fixed bodies: x = x0 + a sin(w e(t)) with the ramped time e. The amplitude is full from the start; the
 !> frequency rises.
 module polydem_oscillation
-   use polydem_driven, only: ramp_t
    use polydem_elementary, only: hypotenuse, sine_and_cosine, two_pi
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_ramp, only: ramp_t
    use polydem_settings, only: settings_t
    implicit none
    private

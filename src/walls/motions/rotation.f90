@@ -1,10 +1,11 @@
 !> Rotation of fixed bodies about a pivot.
 module polydem_rotation
-   use polydem_driven, only: along_angle, ramp_t
+   use polydem_driven, only: along_angle
    use polydem_elementary, only: two_pi
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_ramp, only: ramp_t
    use polydem_settings, only: settings_t
    implicit none
    private

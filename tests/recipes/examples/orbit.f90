@@ -1,11 +1,11 @@
 !> Motion of fixed bodies on a circle without a turn, as of an orbital shaker: x = x0 + a (cos(w e(t)) - 1,
 !> sin(w e(t))), with the ramped time e.
 module polydem_orbit
-   use polydem_driven, only: ramp_t
    use polydem_elementary, only: sine_and_cosine, two_pi
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_motion, only: motion_limits_t, motion_t, placement_t
+   use polydem_ramp, only: ramp_t
    use polydem_settings, only: settings_t
    implicit none
    private
