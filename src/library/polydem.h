@@ -1,8 +1,8 @@
 /* The C interface of polydem: a simulation that is advanced step by step.
  *
  * Each call takes an error handle first. A call that fails leaves a code and a message there, and changes nothing else
- * unless it says so; the next call clears them. No error of polydem ends the program (memory that runs out does). No call writes
- * on the screen, catches signals or changes the number of OpenMP threads of its caller.
+ * unless it says so; the next call clears them. No error of polydem ends the program (memory that runs out does). No
+ * call writes on the screen, catches signals or changes the number of OpenMP threads of its caller.
  *
  * Several simulations live in one process. Each may be used by one thread at a time.
  */
