@@ -25,6 +25,7 @@ module polydem_run_command
       option_t('--continue', '', 'run'), &
       option_t('--changed', '', 'run'), &
       option_t('--walltime', 'HH:MM:SS', 'run'), &
+      option_t('--actions', 'FILE', 'run'), &
       option_t('--check', '', 'info'), &
       option_t('--help', '', all_verbs), &
       option_t('--version', '', all_verbs)]
@@ -39,6 +40,8 @@ module polydem_run_command
       logical :: may_change = .false.
       !> Limit of the elapsed time of a run [s]; 0: no limit
       integer :: limit = 0
+      !> Path of a file of actions; unallocated: there is none
+      character(len=:), allocatable :: actions
       !> Whether a check prints the parts of the scene as a namelist, and nothing else
       logical :: expands = .false.
       !> Whether the files of a result are compared with their checksums
@@ -82,6 +85,8 @@ contains
          self%may_change = .true.
       case ('--walltime')
          call read_duration('--walltime', value, self%limit, error)
+      case ('--actions')
+         self%actions = value
       case ('--expand')
          self%expands = .true.
       case default
@@ -96,6 +101,8 @@ contains
 
       if (self%continues .and. self%force) call raise(error, input_error, &
          '--continue cannot be combined with --force, which starts the run again; give only one of them')
+      if (self%continues .and. allocated(self%actions)) call raise(error, input_error, '--actions begins a run; '// &
+         '--continue goes on with the actions that the result has already: leave out --actions')
       if (self%may_change .and. .not. self%continues) call raise(error, input_error, '--changed needs --continue')
       if (self%help .or. self%version .or. self%file /= '') return
       if (self%checks) call raise(error, input_error, '--check needs the folder of a result: '// &

@@ -33,6 +33,7 @@ contains
       !> Allocated if the verb fails
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
+      type(run_options_t) :: options
       type(thread_choice_t) :: threads
       character(len=:), allocatable :: crowd, text
 
@@ -44,9 +45,13 @@ contains
       if (command%verb == 'run') then
          if (.not. allocated(error)) call read_settings(command%file, command%overrides, settings, error)
          call comm%all_reduce_error(error)
-         if (.not. allocated(error)) call run_simulation(settings, command%force, error, run_options_t( &
-            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp), &
-            threads=threads), comm)
+         if (allocated(error)) return
+         options%continues = command%continues
+         options%may_change = command%may_change
+         options%limit = real(command%limit, dp)
+         options%threads = threads
+         if (allocated(command%actions)) options%actions = command%actions
+         call run_simulation(settings, command%force, error, options, comm)
          return
       end if
       call release_signals()

@@ -5,7 +5,7 @@ module polydem_field_sums
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: reserve_field, add_field, accelerate_by_fields
+   public :: reserve_field, reserve_given, add_field, accelerate_by_fields
 
 contains
 
@@ -22,6 +22,19 @@ contains
       end if
       allocate (sums%field(3, n), source=0.0_wp)
    end subroutine reserve_field
+
+   !> Make room for the part of these forces that actions give to n bodies. New ones are zero.
+   subroutine reserve_given(n, sums)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      type(force_sums_t), intent(inout) :: sums
+
+      if (allocated(sums%given)) then
+         if (size(sums%given, 2) == n) return
+         deallocate (sums%given)
+      end if
+      allocate (sums%given(3, n), source=0.0_wp)
+   end subroutine reserve_given
 
    !> Add the forces on some bodies that are no contacts to their sums, among the normal forces that are not elastic.
    !> Several threads may call it for different bodies.

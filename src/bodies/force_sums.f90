@@ -38,6 +38,8 @@ module polydem_force_sums
       real(wp), allocatable :: field(:, :)
       !> The part of these that is the same acceleration of all bodies, (2) [m/s2]
       real(wp) :: acceleration(2) = 0.0_wp
+      !> The part of these that actions give to bodies, (3, slot); allocated if they give any
+      real(wp), allocatable :: given(:, :)
       !> Whether `bodies` has the total forces of these sums on all bodies, not only on fixed ones
       logical :: are_in_bodies = .true.
    end type force_sums_t

@@ -7,7 +7,7 @@ module polydem_result_summary
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_profile_file, only: read_final_status
-   use polydem_result_files, only: checkpoint_path, log_name, manifest_name, n_checkpoints, open_suffix, &
+   use polydem_result_files, only: actions_name, checkpoint_path, log_name, manifest_name, n_checkpoints, open_suffix, &
       overlaps_name, profile_name, segment_path, series_name, steps_name, trace_name
    use polydem_strings, only: printable, to_text
    implicit none
@@ -138,7 +138,8 @@ contains
       integer(lp), intent(out) :: bytes
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), parameter :: names(*) = [character(len=12) :: manifest_name, log_name, profile_name, &
-                                                 trace_name, steps_name, overlaps_name, series_name]
+                                                 trace_name, steps_name, overlaps_name, series_name, &
+                                                 actions_name]
       integer(ip) :: k
 
       bytes = 0_lp

@@ -11,6 +11,7 @@ module polydem_arrays
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_run_output, only: update_balance
    use polydem_strings, only: index_of
+   use polydem_wall_load, only: wall_load_t
    implicit none
    private
    public :: find_array, kind_absent, kind_integers, kind_reals
@@ -43,6 +44,8 @@ contains
             call find_of_bodies(name(slash + 1:), s%bodies, width, self%integers, self%reals, error)
          case ('contacts')
             call find_of_contacts(name(slash + 1:), s%bodies, s%contacts, width, self%integers, self%reals, error)
+         case ('loads')
+            call find_of_loads(name(slash + 1:), s%walls%loads, width, self%reals, error)
          case ('cell')
             call find_of_cell(name(slash + 1:), s%bodies, self%reals, error)
          case ('energy')
@@ -198,6 +201,24 @@ contains
          end do
       end select
    end subroutine find_of_contacts
+
+   !> Copy the state of the loads: displacement, velocity, force of the load, force of the contacts.
+   subroutine find_of_loads(name, loads, width, reals, error)
+      !> Name of the array
+      character(len=*), intent(in) :: name
+      type(wall_load_t), allocatable, intent(in) :: loads(:)
+      !> Number of values per row
+      integer(lp), intent(inout) :: width
+      !> Allocated if there are loads
+      real(wp), allocatable, intent(inout) :: reals(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      if (name /= 'value') call raise_unknown('loads/'//name, error)
+      if (allocated(error) .or. .not. allocated(loads)) return
+      width = 4_lp
+      reals = [(loads(k)%place, loads(k)%speed, loads(k)%applied, loads(k)%contact, k=1, size(loads))]
+   end subroutine find_of_loads
 
    !> Copy what describes a periodic cell.
    subroutine find_of_cell(name, bodies, reals, error)

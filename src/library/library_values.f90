@@ -1,6 +1,7 @@
 !> The C interface, whose contract is polydem.h: values and arrays of a simulation by name.
 module polydem_library_values
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t, c_long, c_ptr
+   use polydem_actions, only: text_of
    use polydem_arrays, only: find_array
    use polydem_errors, only: error_t, input_error, raise
    use polydem_global_hash, only: hash_all_bodies
@@ -22,7 +23,7 @@ contains
    function polydem_real(error, handle, name) bind(C) result(value)
       type(c_ptr), value :: error
       type(c_ptr), value :: handle
-      !> time, dt [s]
+      !> time, dt [s], gravity_x, gravity_y [m/s2], drag [1/s], friction (factor of the coefficients)
       type(c_ptr), value :: name
       real(c_double) :: value
       type(error_handle_t), pointer :: e
@@ -38,6 +39,14 @@ contains
          value = real(time_of(self%run%simulation), c_double)
       case ('dt')
          value = real(self%run%simulation%dt, c_double)
+      case ('gravity_x')
+         value = real(self%run%simulation%forces%gravity(1), c_double)
+      case ('gravity_y')
+         value = real(self%run%simulation%forces%gravity(2), c_double)
+      case ('drag')
+         value = real(self%run%simulation%forces%drag, c_double)
+      case ('friction')
+         value = real(self%run%simulation%stages%friction_scale, c_double)
       case default
          call raise(e%error, input_error, 'there is no real value "'//fortran_text(name)//'"')
       end select
@@ -87,8 +96,8 @@ contains
    function polydem_text(error, handle, name, buffer, size) bind(C) result(length)
       type(c_ptr), value :: error
       type(c_ptr), value :: handle
-      !> state_hash, stage, settings (resolved), folder, walls (as in the provenance), energy and series (lines of name,
-      !> unit and meaning, with tabs between)
+      !> state_hash, stage, settings (resolved), folder, walls (as in the provenance), loads (a name per line), actions
+      !> (a line each), energy and series (lines of name, unit and meaning, with tabs between)
       type(c_ptr), value :: name
       !> Where it goes
       type(c_ptr), value :: buffer
@@ -118,6 +127,7 @@ contains
       !> Allocated if there is no such text
       type(error_t), allocatable, intent(inout) :: error
       integer(lp) :: hash
+      integer :: k
 
       text = ''
       associate (s => self%run%simulation)
@@ -133,6 +143,13 @@ contains
             if (self%run%options%has_files) text = self%run%folder
          case ('walls')
             text = wall_names_text(s%walls%wall)
+         case ('loads')
+            if (.not. allocated(s%walls%loads)) return
+            do k = 1, size(s%walls%loads)
+               text = text//s%walls%loads(k)%name//new_line('a')
+            end do
+         case ('actions')
+            text = text_of(s%actions)
          case ('energy')
             call update_balance(self%run)
             text = lines_of(self%run%row)

@@ -58,6 +58,16 @@ void polydem_delete_simulation(polydem_error error, polydem_simulation *simulati
  * at, but not advanced. The files of a run that is over are complete. */
 long polydem_advance(polydem_error error, polydem_simulation simulation, long steps, double seconds);
 
+/* Record an action, which takes effect at the begin of the next step: a line of a file of actions in parts.
+ *   kind    wall_velocity, load, gravity, drag, friction, force, end_stage, end_run
+ *   name    of the wall or load; null: none
+ *   bodies  identifiers of n_bodies bodies
+ *   values  n_values values in SI units
+ * `polydem run --actions FILE` repeats a run with its actions to the same bits; the text "actions" has their lines, and
+ * so has actions.txt in a folder. What is not possible is an error, and no action. */
+void polydem_act(polydem_error error, polydem_simulation simulation, const char *kind, const char *name, long n_bodies,
+                 const int64_t *bodies, long n_values, const double *values);
+
 /* Values by their names: see the manual. Unknown names are errors. */
 double polydem_real(polydem_error error, polydem_simulation simulation, const char *name);
 long polydem_integer(polydem_error error, polydem_simulation simulation, const char *name);

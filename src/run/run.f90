@@ -1,11 +1,13 @@
 !> The state of a run: simulation, output files, monitor, checkpoints and time limit.
 module polydem_run
+   use polydem_actions, only: actions_t
    use polydem_checkpoint_fields, only: restarts_t
    use polydem_checkpoint_schedule, only: checkpoints_t
    use polydem_communicator, only: communicator_t
    use polydem_energy_balance, only: balance_t
    use polydem_folder_lock, only: folder_lock_t
    use polydem_kinds, only: dp, lp
+   use polydem_line_writer, only: line_writer_t
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
    use polydem_monitor, only: monitor_t
@@ -39,6 +41,8 @@ module polydem_run
       logical :: is_guest = .false.
       !> Whether the next step keeps the table of contacts for this program
       logical :: tabulates = .false.
+      !> Path of a file of actions (--actions); unallocated: there is none
+      character(len=:), allocatable :: actions
       !> How the number of threads is determined
       type(thread_choice_t) :: threads
    end type run_options_t
@@ -67,6 +71,13 @@ module polydem_run
       type(simulation_t) :: simulation
       !> Hash of the initial scene, in hexadecimal; allocated once `build_start` has built the simulation
       character(len=:), allocatable :: scene_hash
+      !> Actions before the simulation has them
+      type(actions_t), allocatable :: actions
+      !> Record of the actions, and whether it is open
+      type(line_writer_t) :: action_file
+      logical :: records_actions = .false.
+      !> Whether the checkpoint after the last step is not written yet, since actions may follow
+      logical :: owes_checkpoint = .false.
       !> Measures of the initial scene
       type(scene_measures_t) :: measures
       !> Writer of frames

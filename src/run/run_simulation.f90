@@ -1,5 +1,6 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
+   use polydem_action_record, only: close_record
    use polydem_begin_run, only: begin_run
    use polydem_checkpoint_fields, only: restarts_t
    use polydem_clock, only: wall_seconds
@@ -9,6 +10,7 @@ module polydem_run_simulation
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
    use polydem_monitor, only: asks_all, most_guards, set_warning_counts, report_pending_warnings, warning_counts
+   use polydem_perform_actions, only: perform_actions
    use polydem_run, only: run_options_t, run_t, result_folder
    use polydem_finish, only: finish
    use polydem_run_output, only: end_step, needs_table, update_balance, write_frame, write_stage
@@ -88,7 +90,8 @@ contains
       is_over = .not. run%has_begun .or. run%simulation%step >= run%simulation%n_steps
    end function is_over
 
-   !> Do a step, and write what is due after it; collective. Another stage may begin.
+   !> Let actions take effect, do a step, and write what is due after it; collective. Another stage may begin. The
+   !> checkpoint of a guest is due before the next step, so that it knows the actions after this one.
    subroutine take_step(run, error)
       !> A run that is not over
       type(run_t), intent(inout) :: run
@@ -96,14 +99,18 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
 
-      call advance(run%simulation, error, needs_table(run))
+      if (run%owes_checkpoint) call write_due_checkpoint(run, .true., .false., error)
+      run%owes_checkpoint = .false.
+      call perform_actions(run%simulation, error)
+      if (.not. allocated(error)) call advance(run%simulation, error, needs_table(run))
       call synchronise_ranks(run, is_due, must_stop, error)
       if (.not. allocated(error)) call end_step(run, error)
       call run%simulation%timers%lap(stage_output)
       call run%simulation%timers%end_step()
       if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
       if (run%simulation%stages%number > 0_ip .and. .not. allocated(error)) call change_stage(run, error)
-      if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
+      run%owes_checkpoint = run%options%is_guest .and. is_due .and. .not. must_stop
+      if (.not. (allocated(error) .or. run%owes_checkpoint)) call write_due_checkpoint(run, is_due, must_stop, error)
    end subroutine take_step
 
    !> End a run, also after an error or before all steps are done: write its end, and release the folder; collective.
@@ -113,6 +120,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (run%has_begun .and. run%options%has_files) then
+         call close_record(run, error)
          call finish(run, run%restarts%seconds + (wall_seconds() - run%began), error)
          ! The result is complete without it. Before its first step a continued run has no pairs that it could write;
          ! the checkpoint from which it came is that of its end.
@@ -210,6 +218,7 @@ contains
          call s%timers%start()
          ! A checkpoint holds the number of warnings, not their text.
          call report_pending_warnings(s, run%log)
+         call close_record(run, error)
          ! The frames up to the checkpoint are on disk before the checkpoint is.
          call run%trajectory%close(error, run%manifest)
          if (allocated(error)) return

@@ -16,7 +16,7 @@ module polydem_begin_stage
    use polydem_wall, only: number_of
    implicit none
    private
-   public :: prepare_stages, begin_stage, continue_stages, check_reference, find_last_steps, wall_vector
+   public :: prepare_stages, begin_stage, continue_stages, check_reference, find_last_steps, use_parameters, wall_vector
 
    !> Distance of two centres that coincide but for rounding, relative to the radius of a body
    real(wp), parameter :: coincident = sqrt(epsilon(1.0_wp))
@@ -72,7 +72,7 @@ contains
             self%energy_balance, self%comm, self%dt, former, gravity, self%bodies)
       end associate
       call use_parameters(self)
-      call find_last_steps(self%settings%stage, self%dt, self%stages, self%n_steps)
+      call find_last_steps(self)
    end subroutine begin_stage
 
    !> Let force law, other forces, free flight, motions and loads use the parameters of the present stage.
@@ -108,22 +108,23 @@ contains
       if (window%stage < stages%number) window%end = real(stages%first(window%stage + 1_ip), wp)*dt
    end subroutine set_window
 
-   !> Find the last step of the present stage, unless its condition has decided it, and of the run.
-   subroutine find_last_steps(settings, dt, stages, n_steps)
-      !> Settings of all stages
-      type(stage_settings_t), intent(in) :: settings(:)
-      !> Time step [s]
-      real(wp), intent(in) :: dt
-      type(run_stages_t), intent(inout) :: stages
-      !> Greatest number of steps of the run
-      integer(lp), intent(out) :: n_steps
+   !> Find the last step of the present stage, unless its condition or an action has decided it, and of the run.
+   subroutine find_last_steps(self)
+      !> The simulation; `stages` and `n_steps` change if it has stages
+      type(simulation_t), intent(inout) :: self
       integer(ip) :: k
 
-      if (.not. stages%is_decided) stages%last = stages%first(stages%number) + steps_of(settings(stages%number), dt)
-      n_steps = stages%last
-      do k = stages%number + 1_ip, size(settings, kind=ip)
-         n_steps = n_steps + steps_of(settings(k), dt)
-      end do
+      associate (stages => self%stages, settings => self%settings%stage)
+         if (stages%number > 0_ip) then
+            if (.not. stages%is_decided) stages%last = stages%first(stages%number) &
+               + steps_of(settings(stages%number), self%dt)
+            self%n_steps = stages%last
+            do k = stages%number + 1_ip, size(settings, kind=ip)
+               self%n_steps = self%n_steps + steps_of(settings(k), self%dt)
+            end do
+         end if
+      end associate
+      if (allocated(self%actions)) self%n_steps = min(self%n_steps, self%actions%last_step)
    end subroutine find_last_steps
 
    !> Greatest number of steps of a stage
@@ -150,7 +151,7 @@ contains
       end if
       call set_parameters(self%settings, self%stages, self%forces)
       call use_parameters(self)
-      call find_last_steps(self%settings%stage, self%dt, self%stages, self%n_steps)
+      call find_last_steps(self)
       associate (stage => self%settings%stage(self%stages%number))
          if (self%step > self%stages%last) call raise(error, input_error, place_of(self%settings, &
             'stage.'//stage%name, merge('duration', 'longest ', stage%until == 'duration'))//': the run is at step '// &

@@ -1,5 +1,6 @@
 !> The complete state of a simulation.
 module polydem_simulation
+   use polydem_actions, only: actions_t
    use polydem_bodies, only: bodies_t
    use polydem_body_forces, only: body_forces_t
    use polydem_body_motion, only: body_motion_t
@@ -118,6 +119,8 @@ module polydem_simulation
       type(series_t) :: series
       !> Sources and sinks; not allocated if there are none
       type(traffic_t), allocatable :: traffic
+      !> Actions of the program that holds the simulation, or of a file; not allocated if there are none
+      type(actions_t), allocatable :: actions
       !> Boxes of the bodies, and the pairs of those that overlap
       type(neighbour_search_t) :: search
       !> Table of the contacts of this step; empty if the loop did not keep it

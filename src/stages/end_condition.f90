@@ -137,7 +137,7 @@ contains
             stages%last = min(stages%last, step + 1_lp)
          end associate
       end associate
-      call find_last_steps(simulation%settings%stage, simulation%dt, simulation%stages, simulation%n_steps)
+      call find_last_steps(simulation)
    end subroutine decide_end
 
    !> Whether a value fulfils the condition of a stage

@@ -39,6 +39,7 @@ WITH_ERROR: dict[str, tuple[Any, list[Any]]] = {
     "new_snapshot": (c_void_p, [c_void_p]),
     "restore": (None, [c_void_p, c_void_p]),
     "copy_simulation": (c_void_p, [c_void_p]),
+    "act": (None, [c_void_p, c_char_p, c_char_p, c_long, c_void_p, c_long, c_void_p]),
 }
 
 
@@ -131,6 +132,13 @@ class Handle:
         values = np.empty(shape[0] * shape[1], dtype=np.int64 if kind == 1 else np.float64)
         call("copy_integers" if kind == 1 else "copy_reals", self.open, c_void_p(values.ctypes.data), values.size)
         return values if shape[1] == 1 else values.reshape(shape[0], shape[1])
+
+    def act(self, kind: str, name: str = "", bodies: npt.ArrayLike = (), values: npt.ArrayLike = ()) -> None:
+        """Record an action, which takes effect at the begin of the next step."""
+        ids = np.ascontiguousarray(np.asarray(bodies, dtype=np.int64).ravel())
+        numbers = np.ascontiguousarray(np.asarray(values, dtype=np.float64).ravel())
+        call("act", self.open, kind.encode(), name.encode(), ids.size, c_void_p(ids.ctypes.data), numbers.size,
+             c_void_p(numbers.ctypes.data))
 
     def close(self) -> None:
         """End the run and free the simulation. A second call does nothing."""

@@ -52,6 +52,25 @@ class Columns:
         return self._simulation._handle.integer(self._group)
 
 
+class Bodies(Columns):
+    """Columns of the bodies."""
+
+    def apply_force(self, ids: npt.ArrayLike, force: npt.ArrayLike, torque: npt.ArrayLike = 0.0) -> None:
+        """Let a force (2) or (n, 2) [N/m] and a torque [N] act on each of some free bodies, from the next step on.
+
+        They hold until the body is given others; a force of 0 ends them. Their work is among `wall_work` of the energy
+        balance.
+        """
+        which = np.asarray(ids, dtype=np.int64).ravel()
+        try:
+            values = np.column_stack([np.broadcast_to(np.asarray(force, dtype=float), (which.size, 2)),
+                                      np.broadcast_to(np.asarray(torque, dtype=float), which.shape)])
+        except ValueError as error:
+            raise InputError(f"a force is (2) or ({which.size}, 2) numbers, a torque 1 or {which.size}") from error
+        if which.size:
+            self._simulation._handle.act("force", bodies=which, values=values)
+
+
 class Wall:
     """A group &wall: its bodies, and the force and torque on it."""
 
@@ -70,6 +89,65 @@ class Wall:
     def force(self) -> npt.NDArray[np.float64]:
         """Force of the other bodies on it in this step, (2) [N/m]."""
         return np.asarray(self._simulation.bodies.force[self._rows()].sum(axis=0))
+
+    @property
+    def velocity(self) -> npt.NDArray[np.float64]:
+        """Mean velocity of its bodies, (2) [m/s]; set it to move the wall from the next step on."""
+        return np.asarray(self._simulation.bodies.velocity[self._rows()].mean(axis=0))
+
+    @velocity.setter
+    def velocity(self, velocity: npt.ArrayLike) -> None:
+        self.move(velocity)
+
+    def move(self, velocity: npt.ArrayLike = (0.0, 0.0), spin: float = 0.0,
+             pivot: npt.ArrayLike | None = None) -> None:
+        """Give it a velocity [m/s] and an angular velocity [rad/s] about a point that it takes along [m].
+
+        They hold until it is given others, in place of its motions of the namelist. Without `pivot` it turns about the
+        mean of the centres of its bodies. A wall with a load has no velocity of its own.
+        """
+        place = self.position if pivot is None else pivot
+        self._simulation._handle.act("wall_velocity", self.name, values=[
+            *_numbers(velocity, 2, "a velocity"), float(spin), *_numbers(place, 2, "a pivot")])
+
+
+class Load:
+    """A group &load: what it does, and its force."""
+
+    def __init__(self, simulation: Simulation, name: str, number: int):
+        self._simulation, self.name, self._number = simulation, name, number
+
+    def _value(self, k: int) -> float:
+        values = self._simulation._handle.array("loads/value")
+        return float("nan") if values is None else float(values.reshape(-1, 4)[self._number, k])
+
+    @property
+    def displacement(self) -> float:
+        """Displacement of the wall by the load [m], or its angle [rad]."""
+        return self._value(0)
+
+    @property
+    def velocity(self) -> float:
+        """Its rate [m/s, rad/s]."""
+        return self._value(1)
+
+    @property
+    def contacts(self) -> float:
+        """Force [N/m] or torque [N] of the contacts along its direction."""
+        return self._value(3)
+
+    @property
+    def force(self) -> float:
+        """Present force [N/m] or torque [N], with the weight of the wall.
+
+        Set it to change the load from the next step on: it holds until it is set again, without ramp, in place of the
+        force or stress of the namelist.
+        """
+        return self._value(2)
+
+    @force.setter
+    def force(self, force: float) -> None:
+        self._simulation._handle.act("load", self.name, values=[float(force)])
 
 
 class Snapshot:
@@ -269,9 +347,9 @@ class Simulation:
         return [line.split("\t")[0] for line in self._handle.text(table).splitlines()]
 
     @property
-    def bodies(self) -> Columns:
+    def bodies(self) -> Bodies:
         """Columns of the bodies, with the names and units of a `polydem_post` frame."""
-        return Columns(self, "bodies", BODY_COLUMNS)
+        return Bodies(self, "bodies", BODY_COLUMNS)
 
     @property
     def contacts(self) -> Columns:
@@ -282,6 +360,52 @@ class Simulation:
     def walls(self) -> Mapping[str, Wall]:
         """The walls by name."""
         return MappingProxyType({name: Wall(self, name, ids) for name, ids in _walls(self._handle.text("walls"))})
+
+    @property
+    def loads(self) -> Mapping[str, Load]:
+        """The loads by name."""
+        return MappingProxyType({name: Load(self, name, k)
+                                 for k, name in enumerate(self._handle.text("loads").splitlines())})
+
+    @property
+    def gravity(self) -> tuple[float, float]:
+        """Acceleration of gravity [m/s2] without what shakes or turns it; set it to change it from the next step on."""
+        return self._handle.real("gravity_x"), self._handle.real("gravity_y")
+
+    @gravity.setter
+    def gravity(self, gravity: npt.ArrayLike) -> None:
+        self._handle.act("gravity", values=_numbers(gravity, 2, "gravity"))
+
+    @property
+    def drag(self) -> float:
+        """Rate of the drag [1/s]; set it to change it from the next step on."""
+        return self._handle.real("drag")
+
+    @drag.setter
+    def drag(self, rate: float) -> None:
+        self._handle.act("drag", values=[float(rate)])
+
+    @property
+    def friction_scale(self) -> float:
+        """Factor of the friction coefficients; set it to change it from the next step on."""
+        return self._handle.real("friction")
+
+    @friction_scale.setter
+    def friction_scale(self, factor: float) -> None:
+        self._handle.act("friction", values=[float(factor)])
+
+    def end_stage(self) -> None:
+        """Let the next step be the last of the present stage."""
+        self._handle.act("end_stage")
+
+    def end(self) -> None:
+        """Let the next step be the last of the run, whose result is then complete."""
+        self._handle.act("end_run")
+
+    @property
+    def actions(self) -> str:
+        """All actions so far, a line each: in a file, `polydem run --actions FILE` repeats the run to the same bits."""
+        return self._handle.text("actions")
 
     def frame(self) -> Any:
         """The present state as a `polydem_post` frame, for every measure and picture."""
@@ -303,6 +427,14 @@ class Simulation:
         other._observers, other._stop = [], None
         other._handle = Handle(call("copy_simulation", self._handle.open))
         return other
+
+
+def _numbers(values: npt.ArrayLike, n: int, what: str) -> npt.NDArray[np.float64]:
+    """Some real numbers, as many as there must be."""
+    found = np.asarray(values, dtype=np.float64).ravel()
+    if found.size != n:
+        raise InputError(f"{what} has {n} numbers, not {found.size}")
+    return found
 
 
 def _name_and_text(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[str, str | None]:

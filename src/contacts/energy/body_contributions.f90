@@ -14,7 +14,7 @@ module polydem_body_contributions
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: n_channels, n_wall_channels, n_motions, add_powers, add_fields, add_torques, add_walls, motion_of
+   public :: n_channels, n_wall_channels, n_motions, add_powers, add_fields, add_given, add_torques, add_walls, motion_of
 
    !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
    !> the damping of tilts, and of the tangential forces [W/m]
@@ -133,6 +133,32 @@ contains
          wall_channels(1, s) = wall_channels(1, s) + power
       end do
    end subroutine add_fields
+
+   !> Move the powers of forces that actions give to some bodies from those of damping to those of fixed bodies.
+   pure subroutine add_given(bodies, given, weight, first, last, channels, wall_channels)
+      type(bodies_t), intent(in) :: bodies
+      !> Forces along x and y [N/m] and torques [N], (3, slot), which are among the fields
+      real(wp), intent(in) :: given(:, :)
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Channels of all bodies, (n_channels, slot) [W/m]
+      real(wp), intent(inout) :: channels(:, :)
+      !> Wall channels of all bodies, (n_wall_channels, slot)
+      real(wp), intent(inout) :: wall_channels(:, :)
+      real(wp) :: power, flow(3)
+      integer(ip) :: s
+
+      do s = first, last
+         ! The power at the velocity of the shear is there already.
+         flow = shear_flow(bodies%cell, bodies%position(2, s))
+         power = weight*((given(1, s)*(bodies%velocity(1, s) - flow(1)) + given(2, s)*bodies%velocity(2, s)) &
+                         + given(3, s)*(bodies%angular_velocity(s) - flow(3)))
+         channels(2, s) = channels(2, s) - power
+         wall_channels(1, s) = wall_channels(1, s) + power
+      end do
+   end subroutine add_given
 
    !> Add the torques of gravity on some bodies about the origin, times a weight.
    pure subroutine add_torques(n, weight, gravity, mass, position, torque)

@@ -23,8 +23,8 @@
 !> therefore has a scale, and forces that cancel within a fixed body add to it.
 module polydem_energy_balance
    use polydem_bodies, only: bodies_t
-   use polydem_body_contributions, only: add_fields, add_powers, add_torques, add_walls, motion_of, n_channels, &
-      n_motions, n_wall_channels
+   use polydem_body_contributions, only: add_fields, add_given, add_powers, add_torques, add_walls, motion_of, &
+      n_channels, n_motions, n_wall_channels
    use polydem_communicator, only: communicator_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
@@ -185,6 +185,8 @@ contains
       call add_powers(bodies, forces, weight, first, last, sums%power_sum)
       if (allocated(forces%field)) call add_fields(bodies, forces%field, forces%acceleration, weight, first, last, &
                                                   sums%power_sum, sums%wall_sum)
+      if (allocated(forces%given)) call add_given(bodies, forces%given, weight, first, last, sums%power_sum, &
+                                                  sums%wall_sum)
       if (last < first .or. .not. any(abs(gravity) > 0.0_wp)) return
       call add_torques(last - first + 1_ip, weight, gravity, bodies%mass(first), bodies%position(1, first), &
                        sums%torque(first))

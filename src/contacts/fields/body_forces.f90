@@ -4,8 +4,9 @@ module polydem_body_forces
    use polydem_body_force, only: body_force_t
    use polydem_changing_gravity, only: changes_gravity, changing_gravity_t, new_changing_gravity
    use polydem_drag, only: drag_t
-   use polydem_field_sums, only: add_field, reserve_field
+   use polydem_field_sums, only: add_field, reserve_field, reserve_given
    use polydem_force_sums, only: force_sums_t, of_normal, of_tangential, sum_torque, sum_x, sum_y
+   use polydem_given_forces, only: given_forces_t
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_local_damping, only: local_damping_t
    use polydem_settings, only: forces_settings_t
@@ -23,6 +24,8 @@ module polydem_body_forces
    type :: body_forces_t
       !> How gravity changes; not allocated if it is constant
       type(changing_gravity_t), allocatable :: changing
+      !> Forces that actions give to bodies; not allocated if there are none
+      type(given_forces_t), allocatable :: given
       !> The forces, in the order in which they are added; not allocated if there is none
       type(listed_force_t), allocatable :: list(:)
    contains
@@ -32,6 +35,8 @@ module polydem_body_forces
       procedure :: rate
       procedure :: description
       procedure :: add
+      procedure :: give
+      procedure :: allow_drag
    end type body_forces_t
 
 contains
@@ -66,11 +71,40 @@ contains
       call move_alloc(longer, self%list)
    end subroutine add
 
+   !> Give forces and torques to bodies, which are held until they are given others.
+   subroutine give(self, id, value)
+      class(body_forces_t), intent(inout) :: self
+      !> Identifiers of the bodies, each once
+      integer(ip), intent(in) :: id(:)
+      !> Forces along x and y [N/m] and torques [N], (3, body)
+      real(wp), intent(in) :: value(:, :)
+
+      if (.not. allocated(self%given)) allocate (self%given)
+      call self%given%set(id, value)
+   end subroutine give
+
+   !> Let there be a drag, so that its rate can change.
+   subroutine allow_drag(self, settings)
+      class(body_forces_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+      type(body_forces_t) :: longer
+      integer :: k
+
+      call longer%add(drag_t(name='drag'), settings)
+      if (allocated(self%list)) then
+         do k = 1, size(self%list)
+            if (self%list(k)%force%name == 'drag') return
+            call longer%add(self%list(k)%force, settings)
+         end do
+      end if
+      call move_alloc(longer%list, self%list)
+   end subroutine allow_drag
+
    !> Whether there is any force
    pure logical function act(self)
       class(body_forces_t), intent(in) :: self
 
-      act = allocated(self%list) .or. allocated(self%changing)
+      act = allocated(self%list) .or. allocated(self%changing) .or. allocated(self%given)
    end function act
 
    !> Add the forces on all free bodies to the sums of contact forces.
@@ -88,6 +122,7 @@ contains
 
       if (.not. self%act()) return
       call reserve_field(bodies%n, sums)
+      if (allocated(self%given)) call reserve_given(bodies%n, sums)
       if (allocated(self%changing)) sums%acceleration = self%changing%acceleration(gravity, time)
       !$omp parallel do if (size(bodies%free) > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, gravity, bodies, sums) private(low)
@@ -105,7 +140,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: slots(:)
       type(force_sums_t), intent(inout) :: sums
-      real(wp) :: others(3, block_size), force(3, block_size)
+      real(wp) :: others(3, block_size), force(3, block_size), given(3, block_size)
       integer :: k
 
       do k = 1, size(slots)
@@ -117,6 +152,11 @@ contains
             force(3, k) = 0.0_wp
          end associate
       end do
+      if (allocated(self%given)) then
+         call self%given%find(bodies, slots, given)
+         sums%given(:, slots) = given(:, :size(slots))
+         force(:, :size(slots)) = force(:, :size(slots)) + given(:, :size(slots))
+      end if
       if (allocated(self%list)) then
          do k = 1, size(self%list)
             call self%list(k)%force%add(others, bodies, slots, force)

@@ -7,6 +7,7 @@
 !>     steps.h5                   timings and counts of every step (optional)
 !>     overlaps.csv               deep contacts at the start, if any
 !>     series.csv                 series of walls and loads (optional)
+!>     actions.txt                actions of the program that held the run, or of its file of actions, if any
 !>     log.txt                    log of the run
 !>     checkpoint_1.h5, _2.h5     the last two checkpoints, written alternately
 !>     manifest.txt               list of these files with checksums (polydem_manifest)
@@ -18,7 +19,8 @@ module polydem_result_files
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: segment_path, checkpoint_path, log_name, overlaps_name, profile_name, series_name, steps_name, trace_name
+   public :: segment_path, checkpoint_path, actions_name, log_name, overlaps_name, profile_name, series_name, steps_name
+   public :: trace_name
    public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, stem, segment_number, last_segment, &
       manifest_name, forms_of, complete_name, conflict_text, is_table
 
@@ -32,7 +34,8 @@ module polydem_result_files
 
    !> Names of single files of a result
    character(len=*), parameter :: manifest_name = 'manifest.txt', log_name = 'log.txt', profile_name = 'profile.h5', &
-      trace_name = 'trace.h5', steps_name = 'steps.h5', overlaps_name = 'overlaps.csv', series_name = 'series.csv'
+      trace_name = 'trace.h5', steps_name = 'steps.h5', overlaps_name = 'overlaps.csv', series_name = 'series.csv', &
+      actions_name = 'actions.txt'
 
 contains
 

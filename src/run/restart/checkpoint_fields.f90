@@ -16,6 +16,7 @@ module polydem_checkpoint_fields
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_monitor, only: serialize_guards
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
+   use polydem_perform_actions, only: repeat_actions
    use polydem_participants, only: serialize_participants
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_run_stages, only: serialize_stages
@@ -74,6 +75,7 @@ contains
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
          call continue_stages(s, serializer%error)
+         if (.not. allocated(serializer%error)) call repeat_actions(s)
          call rebuild_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run

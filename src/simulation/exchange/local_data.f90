@@ -18,7 +18,7 @@ module polydem_local_data
    use polydem_wall, only: wall_t
    implicit none
    private
-   public :: rebuild_local_data
+   public :: rebuild_local_data, list_moving
 
 contains
 
@@ -36,7 +36,8 @@ contains
       call self%walls%mark_removed(self%bodies)
       call find_folds(self%bodies)
       call self%law%measure(self%bodies)
-      if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
+      if (self%stages%number > 0_ip .or. allocated(self%actions)) &
+         call self%law%scale_friction(self%stages%friction_scale)
       call fit_table(self%law, self%contacts)
       self%loop%walls%n = 0_ip
       self%loop%walls%border%n = 0_ip

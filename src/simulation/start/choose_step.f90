@@ -21,7 +21,7 @@ module polydem_choose_step
    !> Upper limit of the number of steps
    real(wp), parameter :: most_steps = 1.0e15_wp
    !> Greatest change of a velocity in a step by a force that is no contact, as a share
-   real(wp), parameter :: greatest_change = 0.1_wp
+   real(wp), parameter, public :: greatest_change = 0.1_wp
 
 contains
 
@@ -82,9 +82,8 @@ contains
          call check_number(self, duration, steps, error)
          if (allocated(error)) return
          self%n_steps = nint(steps, lp)
-         if (self%stages%number > 0_ip) call find_last_steps(self%settings%stage, self%dt, self%stages, &
-                                                                 self%n_steps)
       end associate
+      call find_last_steps(self)
       call check_rate(self, error)
       call check_cell_mass(self, error)
    end subroutine choose_step
