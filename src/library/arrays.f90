@@ -7,6 +7,7 @@ module polydem_arrays
    use polydem_contact_columns, only: contact_columns, values_of
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_force_sums, only: total_forces
    use polydem_handles, only: simulation_handle_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_run_output, only: update_balance
@@ -41,6 +42,9 @@ contains
       associate (s => self%run%simulation)
          select case (name(:max(slash - 1, 0)))
          case ('bodies')
+            ! A step keeps the total forces on fixed bodies only.
+            if (s%loop%step == s%step .and. any(name(slash + 1:) == [character(len=6) :: 'force', 'torque'])) &
+               call total_forces(s%forces%gravity, s%loop%force_sums, s%bodies)
             call find_of_bodies(name(slash + 1:), s%bodies, width, self%integers, self%reals, error)
          case ('contacts')
             call find_of_contacts(name(slash + 1:), s%bodies, s%contacts, width, self%integers, self%reals, error)

@@ -15,7 +15,7 @@ module polydem_library
    private
 
    !> Values of `mode` in `polydem_new_simulation`
-   integer(c_int), parameter :: mode_force = 1_c_int, mode_continue = 2_c_int
+   integer(c_int), parameter :: mode_force = 1_c_int, mode_continue = 2_c_int, mode_exchange = 4_c_int
 
 contains
 
@@ -94,7 +94,7 @@ contains
       type(c_ptr), value :: overrides
       !> Folder of the result
       type(c_ptr), value :: folder
-      !> What becomes of a result that is in the folder
+      !> What becomes of a result that is in the folder, and whether bodies may enter and leave
       integer(c_int), value :: mode
       !> Number of OpenMP threads
       integer(c_int), value :: threads
@@ -110,7 +110,8 @@ contains
       call own(made, int(threads))
       made%run%options%is_guest = .true.
       made%run%options%has_files = c_associated(folder)
-      made%run%options%continues = mode == mode_continue
+      made%run%options%continues = mod(mode, 4_c_int) == mode_continue
+      made%run%options%exchanges = mode >= mode_exchange
       call gather_overrides(n_overrides, overrides, fortran_text(folder), words)
       if (c_associated(text)) then
          call read_settings_text(fortran_text(file), fortran_text(text), words, made%settings, e%error)
@@ -119,7 +120,7 @@ contains
       end if
       if (.not. allocated(e%error)) then
          call enter(c_loc(made), self, e%error)
-         call start_run(made%settings, mode == mode_force, made%run, e%error)
+         call start_run(made%settings, mod(mode, 4_c_int) == mode_force, made%run, e%error)
          if (allocated(e%error)) call end_quietly(made)
          call leave(made)
       end if

@@ -2,7 +2,7 @@
 module polydem_library_actions
    use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int64_t, c_long, c_ptr
    use polydem_action_record, only: append_to_record
-   use polydem_actions, only: action_t, new_action
+   use polydem_actions, only: action_t, new_action, remove_bodies
    use polydem_errors, only: input_error, raise
    use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, leave, simulation_handle_t
    use polydem_kinds, only: lp, wp
@@ -39,7 +39,10 @@ contains
       if (is_over(self%run)) call raise(e%error, input_error, 'the run is over: no step follows')
       if (.not. allocated(e%error)) call new_action(self%run%simulation%step, fortran_text(kind), &
          fortran_text(name), integers_at(n_bodies, bodies), reals_at(n_values, values), action, e%error)
-      if (.not. allocated(e%error)) call check_action(self%run%simulation, action, e%error)
+      if (.not. allocated(e%error)) call check_action(self%run%simulation, action, &
+         self%run%simulation%actions%n, e%error)
+      if (action%kind == remove_bodies .and. self%run%simulation%loop%step /= self%run%simulation%step) &
+         call raise(e%error, input_error, 'bodies cannot be removed before the first step of a run that is resumed')
       if (.not. allocated(e%error) .and. self%run%options%has_files) call append_to_record(self%run, action, e%error)
       if (.not. allocated(e%error)) call self%run%simulation%actions%append(action)
       call leave(self)

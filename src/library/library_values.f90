@@ -4,6 +4,7 @@ module polydem_library_values
    use polydem_actions, only: text_of
    use polydem_arrays, only: find_array
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_exchanged_bodies, only: number_added
    use polydem_global_hash, only: hash_all_bodies
    use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, give_text, leave, simulation_handle_t
    use polydem_hash, only: hexadecimal
@@ -57,7 +58,8 @@ contains
    function polydem_integer(error, handle, name) bind(C) result(value)
       type(c_ptr), value :: error
       type(c_ptr), value :: handle
-      !> step, n_steps (of the whole run, as far as known), stage (number from 1; 0: none), bodies, contacts, threads,
+      !> step, n_steps (of the whole run, as far as known), stage (number from 1; 0: none), bodies, contacts, threads, next_id
+      !> (identifier of the next body that is added),
       !> is_over (1: all steps are done)
       type(c_ptr), value :: name
       integer(c_long) :: value
@@ -83,6 +85,8 @@ contains
             value = int(s%contacts%n, c_long)
          case ('threads')
             value = int(self%threads, c_long)
+         case ('next_id')
+            value = int(s%bodies%last_id, c_long) + number_added(s%actions, s%step) + 1_c_long
          case ('is_over')
             value = merge(1_c_long, 0_c_long, is_over(self%run) .and. .not. allocated(self%failure))
          case default
@@ -96,8 +100,8 @@ contains
    function polydem_text(error, handle, name, buffer, size) bind(C) result(length)
       type(c_ptr), value :: error
       type(c_ptr), value :: handle
-      !> state_hash, stage, settings (resolved), folder, walls (as in the provenance), loads (a name per line), actions
-      !> (a line each), energy and series (lines of name, unit and meaning, with tabs between)
+      !> state_hash, stage, settings (resolved), folder, walls (as in the provenance), loads (a name per line),
+      !> actions (a line each), energy and series (lines of name, unit and meaning, with tabs between)
       type(c_ptr), value :: name
       !> Where it goes
       type(c_ptr), value :: buffer

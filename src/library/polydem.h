@@ -22,8 +22,9 @@ typedef struct polydem_snapshot_s *polydem_snapshot;
 /* Codes of errors, the exit codes of the program */
 enum { POLYDEM_OK = 0, POLYDEM_RUN_ERROR = 1, POLYDEM_INPUT_ERROR = 2, POLYDEM_IO_ERROR = 3 };
 
-/* What becomes of a result that is in the folder already */
-enum { POLYDEM_NEW = 0, POLYDEM_FORCE = 1, POLYDEM_CONTINUE = 2 };
+/* What becomes of a result that is in the folder already; with POLYDEM_EXCHANGE added, actions may let bodies enter and
+ * leave */
+enum { POLYDEM_NEW = 0, POLYDEM_FORCE = 1, POLYDEM_CONTINUE = 2, POLYDEM_EXCHANGE = 4 };
 
 /* Kinds of arrays */
 enum { POLYDEM_ABSENT = 0, POLYDEM_INTEGERS = 1, POLYDEM_REALS = 2 };
@@ -44,7 +45,7 @@ long polydem_error_message(polydem_error error, char *buffer, long size);
  *   text       the namelist; null: it is read from the file
  *   overrides  n_overrides texts "group.key=value" or "group.name.key=value"
  *   folder     folder of the result, which is that of `polydem run`; null: nothing is written
- *   mode       POLYDEM_NEW, POLYDEM_FORCE or POLYDEM_CONTINUE
+ *   mode       POLYDEM_NEW, POLYDEM_FORCE or POLYDEM_CONTINUE, or one of them + POLYDEM_EXCHANGE
  *   threads    number of OpenMP threads; 0: one */
 polydem_simulation polydem_new_simulation(polydem_error error, const char *file, const char *text, long n_overrides,
                                           const char *const *overrides, const char *folder, int mode, int threads);
@@ -59,8 +60,8 @@ void polydem_delete_simulation(polydem_error error, polydem_simulation *simulati
 long polydem_advance(polydem_error error, polydem_simulation simulation, long steps, double seconds);
 
 /* Record an action, which takes effect at the begin of the next step: a line of a file of actions in parts.
- *   kind    wall_velocity, load, gravity, drag, friction, force, end_stage, end_run
- *   name    of the wall or load; null: none
+ *   kind    wall_velocity, load, gravity, drag, friction, force, add, remove, end_stage, end_run
+ *   name    of the wall, load or material ("-": none); null for other kinds
  *   bodies  identifiers of n_bodies bodies
  *   values  n_values values in SI units
  * `polydem run --actions FILE` repeats a run with its actions to the same bits; the text "actions" has their lines, and

@@ -43,6 +43,8 @@ module polydem_run
       logical :: tabulates = .false.
       !> Path of a file of actions (--actions); unallocated: there is none
       character(len=:), allocatable :: actions
+      !> Whether actions may let bodies enter and leave
+      logical :: exchanges = .false.
       !> How the number of threads is determined
       type(thread_choice_t) :: threads
    end type run_options_t
@@ -73,8 +75,9 @@ module polydem_run
       character(len=:), allocatable :: scene_hash
       !> Actions before the simulation has them
       type(actions_t), allocatable :: actions
-      !> Record of the actions, and whether it is open
+      !> Record of the actions
       type(line_writer_t) :: action_file
+      !> Whether it is open
       logical :: records_actions = .false.
       !> Whether the checkpoint after the last step is not written yet, since actions may follow
       logical :: owes_checkpoint = .false.

@@ -11,7 +11,7 @@ module polydem_new_traffic
    use polydem_traffic, only: set_departure, traffic_t
    implicit none
    private
-   public :: new_traffic
+   public :: new_traffic, start_traffic
 
 contains
 
@@ -24,10 +24,7 @@ contains
       integer(ip) :: k, seed
 
       if (size(settings%source) + size(settings%sink) == 0) return
-      allocate (traffic)
-      allocate (traffic%sources(size(settings%source)), traffic%sinks(size(settings%sink)))
-      traffic%departures%name = 'departures'
-      call set_departure(traffic%departures%row, 0_lp, 0_lp, [real(wp) :: 0, 0, 0, 0, 0, 0])
+      call start_traffic(size(settings%source), size(settings%sink), traffic)
       do k = 1_ip, size(traffic%sources, kind=ip)
          associate (given => settings%source(k))
             seed = given%seed
@@ -52,5 +49,17 @@ contains
          traffic%sinks(k)%stage = number_of_stage(settings, settings%sink(k)%stage)
       end do
    end subroutine new_traffic
+
+   !> Start some sources and sinks, or none in a run in which actions let bodies enter and leave.
+   subroutine start_traffic(n_sources, n_sinks, traffic)
+      !> Numbers of sources and sinks
+      integer, intent(in) :: n_sources, n_sinks
+      type(traffic_t), allocatable, intent(out) :: traffic
+
+      allocate (traffic)
+      allocate (traffic%sources(n_sources), traffic%sinks(n_sinks))
+      traffic%departures%name = 'departures'
+      call set_departure(traffic%departures%row, 0_lp, 0_lp, [real(wp) :: 0, 0, 0, 0, 0, 0])
+   end subroutine start_traffic
 
 end module polydem_new_traffic

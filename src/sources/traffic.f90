@@ -34,7 +34,7 @@ module polydem_traffic
 
    !> Bodies that leave before the next step, the same on all ranks
    type :: departure_t
-      !> Identifiers, ascending, and numbers of their sinks
+      !> Identifiers, ascending, and numbers of their sinks; 0: an action removes it
       integer(lp), allocatable :: id(:), sink(:)
       !> Mass [kg/m], velocity [m/s], place [m] and number of the material of each, (number_of_values, body)
       real(dp), allocatable :: value(:, :)
@@ -110,10 +110,12 @@ contains
       integer :: k
 
       do k = 1, size(departing%id)
-         associate (sink => self%sinks(departing%sink(k)), value => departing%value(:, k), row => self%departures%row)
-            sink%departed = sink%departed + 1_lp
-            sink%mass = sink%mass + real(value(1), wp)
-            call set_departure(row, departing%sink(k), departing%id(k), real(value, wp))
+         associate (s => departing%sink(k), value => departing%value(:, k))
+            if (s > 0_lp) then
+               self%sinks(s)%departed = self%sinks(s)%departed + 1_lp
+               self%sinks(s)%mass = self%sinks(s)%mass + real(value(1), wp)
+            end if
+            call set_departure(self%departures%row, s, departing%id(k), real(value, wp))
          end associate
          call self%departures%keep_row(step, time)
       end do
@@ -128,7 +130,7 @@ contains
       !> Mass, velocity, place and material
       real(wp), intent(in) :: value(number_of_values)
 
-      call row%set('sink', real(sink, wp), '1', 'number of the sink among the groups &sink, from 1')
+      call row%set('sink', real(sink, wp), '1', 'number of the sink among the groups &sink, from 1; 0: none')
       call row%set('id', real(id, wp), '1', 'identifier of the body')
       call row%set('material', value(6), '1', 'its material: position among the groups &material, 0: none of them')
       call row%set('mass', value(1), 'kg/m', 'its mass')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import byref, c_char_p, c_void_p
 from os import PathLike, fspath
 from types import MappingProxyType, TracebackType
@@ -21,6 +21,8 @@ from .namelist import override, write_namelist
 PATIENCE = 0.1
 #: What becomes of a result that is in the folder, as in polydem.h
 NEW, FORCE, CONTINUE = 0, 1, 2
+#: Added to one of them: bodies may enter and leave
+EXCHANGE = 4
 #: Columns of the bodies, by the names of a `polydem_post` frame
 BODY_COLUMNS = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "mass", "inertia", "material",
                 "image", "vertex_start", "force", "torque")
@@ -169,6 +171,7 @@ class Simulation:
         threads    number of OpenMP threads
         folder     folder of the result, which is that of `polydem run`; None: nothing is written
         force, resume  whether a result in the folder is replaced, or continued
+        exchange   whether bodies may be added and removed
 
     Use it in a `with` statement, or call `close`. A simulation with a folder that is closed before its end is
     interrupted and can be resumed. Values are copies. One thread at a time may use a simulation.
@@ -176,7 +179,8 @@ class Simulation:
 
     def __init__(self, source: str | PathLike[str] | Mapping[str, Any],
                  overrides: Mapping[str, Any] | None = None, *, threads: int = 1,
-                 folder: str | PathLike[str] | None = None, force: bool = False, resume: bool = False):
+                 folder: str | PathLike[str] | None = None, force: bool = False, resume: bool = False,
+                 exchange: bool = False):
         self._observers: list[tuple[int, Observer]] = []
         self._stop: str | None = None
         if force and resume:
@@ -187,7 +191,7 @@ class Simulation:
         file, text = _name_and_text(source)
         pointer = call("new_simulation", file.encode(), None if text is None else text.encode(), len(words),
                        (c_char_p * len(words))(*words), None if folder is None else fspath(folder).encode(),
-                       CONTINUE if resume else FORCE if force else NEW, int(threads))
+                       (CONTINUE if resume else FORCE if force else NEW) + EXCHANGE * bool(exchange), int(threads))
         self._handle = Handle(pointer)
 
     # --- life ---------------------------------------------------------------------------------------------------------
@@ -393,6 +397,34 @@ class Simulation:
     @friction_scale.setter
     def friction_scale(self, factor: float) -> None:
         self._handle.act("friction", values=[float(factor)])
+
+    def add(self, outlines: Sequence[npt.ArrayLike], *, velocity: npt.ArrayLike = (0.0, 0.0),
+            angular_velocity: npt.ArrayLike = 0.0, material: str = "", density: float = 0.0) -> npt.NDArray[np.int64]:
+        """Let free bodies enter before the next step; return their identifiers.
+
+        Each outline is convex, (corners, 2) [m], and overlaps no other body. Velocities (2) or (n, 2) [m/s], angular
+        velocities [rad/s]. `density` [kg/m3] is by default that of the material or of &scene. `exchange=True` is needed
+        when the simulation is made, unless it has sources or sinks.
+        """
+        bodies = [np.asarray(outline, dtype=float) for outline in outlines]
+        for outline in bodies:
+            if outline.ndim != 2 or outline.shape[1] != 2:
+                raise InputError(f"an outline is (corners, 2) numbers, not {outline.shape}")
+        n = len(bodies)
+        velocities = np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2))
+        spins = np.broadcast_to(np.asarray(angular_velocity, dtype=float), (n,))
+        first = self._handle.integer("next_id")
+        values = [[*v, spin, *outline.ravel()] for outline, v, spin in zip(bodies, velocities, spins)]
+        if n:
+            self._handle.act("add", material or "-", [len(outline) for outline in bodies],
+                             np.concatenate([[density], *values]))
+        return np.arange(first, first + n)
+
+    def remove(self, ids: npt.ArrayLike) -> None:
+        """Let free bodies leave before the next step; `exchange=True` as for `add`."""
+        which = np.asarray(ids, dtype=np.int64).ravel()
+        if which.size:
+            self._handle.act("remove", bodies=which)
 
     def end_stage(self) -> None:
         """Let the next step be the last of the present stage."""

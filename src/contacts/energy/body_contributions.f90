@@ -14,7 +14,8 @@ module polydem_body_contributions
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: n_channels, n_wall_channels, n_motions, add_powers, add_fields, add_given, add_torques, add_walls, motion_of
+   public :: n_channels, n_wall_channels, n_motions, add_powers, add_fields, add_given, add_torques, add_walls
+   public :: motion_of
 
    !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
    !> the damping of tilts, and of the tangential forces [W/m]

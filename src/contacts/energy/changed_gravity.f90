@@ -2,8 +2,10 @@
 !>
 !> The potential energy of gravity and its impulse are those of the present acceleration, as if it had always acted. So
 !> the values at the start change with it: by the jump of the potential energy, and by the impulse that the former
-!> acceleration gave in place of the new one. The residuals do not change. Like the potential energy, its jump counts
-!> the whole path through the copies of a cell.
+!> acceleration gave in place of the new one. The former one still acts in the first half of the next step, as velocity
+!> Verlet has it: this changes the kinetic energy by m dt/2 (g' - g).v + m dt^2/8 (g' - g)^2 more than the potential
+!> explains. So the residuals do not change. Like the potential energy, its jump counts the whole path through the
+!> copies of a cell.
 module polydem_changed_gravity
    use polydem_bodies, only: bodies_t
    use polydem_bodies_in_cell, only: path_of
@@ -29,23 +31,28 @@ contains
       real(wp), intent(in) :: former(2), gravity(2)
       !> Bodies at the end of the step
       type(bodies_t), intent(in) :: bodies
-      type(exact_sum_t) :: partial(3)
-      real(wp) :: total(3), elapsed
+      type(exact_sum_t) :: partial(5)
+      real(wp) :: total(5), elapsed, jump(2)
       integer(ip) :: k
 
       do k = 1_ip, size(bodies%free, kind=ip)
-         associate (m => bodies%mass(bodies%free(k)), x => path_of(bodies, bodies%free(k)))
+         associate (m => bodies%mass(bodies%free(k)), x => path_of(bodies, bodies%free(k)), &
+                    v => bodies%velocity(:, bodies%free(k)))
             call partial(1)%add(m)
             call partial(2)%add(m*x(1))
             call partial(3)%add(m*x(2))
+            call partial(4)%add(m*v(1))
+            call partial(5)%add(m*v(2))
          end associate
       end do
       call all_reduce_exact_sums(comm, partial)
       total = partial%value()
       ! The rate of a step counts half before its end and half after it.
       elapsed = dt*(real(sums%steps, wp) + 0.5_wp)
-      sums%start(1) = sums%start(1) - (gravity(1) - former(1))*total(2) - (gravity(2) - former(2))*total(3)
-      sums%start(2:3) = sums%start(2:3) - elapsed*total(1)*(gravity - former)
+      jump = gravity - former
+      sums%start(1) = sums%start(1) - jump(1)*total(2) - jump(2)*total(3) &
+         - 0.5_wp*dt*(jump(1)*total(4) + jump(2)*total(5)) + 0.125_wp*dt*dt*total(1)*(jump(1)**2 + jump(2)**2)
+      sums%start(2:3) = sums%start(2:3) - elapsed*total(1)*jump
    end subroutine change_gravity
 
 end module polydem_changed_gravity

@@ -1,15 +1,16 @@
 !> The record of the actions of a run: `actions.txt` in its result. `polydem run` repeats a run from it.
 !>
-!> A program that holds the simulation appends each action before it takes effect, and so before a checkpoint contains
-!> it. A run with a file of actions has them all in its record from the start, and resumes with them. A line that was not
+!> A program that holds the simulation appends each action before it takes effect, and so before a checkpoint has it.
+!> A run with a file of actions has them all in its record from the start, and resumes with them. A line that was not
 !> completed, because the program was killed, is no action.
 module polydem_action_record
-   use polydem_actions, only: action_t, actions_t, line_of, read_action
+   use polydem_actions, only: action_t, actions_t, add_bodies, line_of, read_action, remove_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists, is_folder, rename_file, sync_file
    use polydem_folders, only: read_bytes
    use polydem_kinds, only: ip, lp
    use polydem_line_writer, only: line_writer_t
+   use polydem_participants, only: allow_exchange
    use polydem_result_files, only: actions_name, unfinished
    use polydem_run, only: run_t
    use polydem_strings, only: counted, to_text
@@ -18,8 +19,8 @@ module polydem_action_record
    public :: read_record, take_record, write_record, append_to_record, close_record, read_actions
 
    !> First line of a file of actions
-   character(len=*), parameter :: header = '# polydem actions 1: step, kind, name or number of bodies and identifiers, '// &
-      'values (SI units)'
+   character(len=*), parameter :: header = '# polydem actions 1: step, kind, name, number of bodies and '// &
+      'identifiers, values (SI units)'
 
 contains
 
@@ -37,7 +38,7 @@ contains
          call read_actions(run%options%actions, run%actions, error)
       else if (run%options%continues .and. run%options%has_files) then
          path = run%folder//'/'//actions_name
-         if (exists(path, error) .and. .not. allocated(error)) then
+         if (exists(path, error)) then
             allocate (run%actions)
             call read_actions(path, run%actions, error)
          end if
@@ -48,6 +49,7 @@ contains
 
    !> Read a file of actions.
    subroutine read_actions(path, actions, error)
+      !> Path of the file
       character(len=*), intent(in) :: path
       type(actions_t), intent(out) :: actions
       !> Names the file and the line
@@ -90,9 +92,13 @@ contains
    subroutine take_record(run)
       !> The run with its simulation, before a checkpoint is restored
       type(run_t), intent(inout) :: run
+      integer :: k
 
       if (.not. allocated(run%actions)) return
       associate (actions => run%actions)
+         do k = 1, actions%n
+            run%options%exchanges = run%options%exchanges .or. any(actions%list(k)%kind == [add_bodies, remove_bodies])
+         end do
          if (run%options%is_guest .and. run%options%continues) then
             do while (actions%n > 0)
                if (actions%list(actions%n)%step <= run%previous%step) exit
@@ -100,6 +106,7 @@ contains
             end do
          end if
       end associate
+      if (run%options%exchanges) call allow_exchange(run%simulation)
       call move_alloc(run%actions, run%simulation%actions)
    end subroutine take_record
 

@@ -1,7 +1,7 @@
 !> Actions: what a program that holds a simulation, or a file of its actions, changes between two steps.
 !>
-!> An action is recorded with the number of steps done, and takes effect at the begin of the next step. So a run with the
-!> same actions at the same steps has the same bits, whoever records them. Parameters, velocities and forces hold until
+!> An action is recorded with the number of steps done, and takes effect at the begin of the next step. So a run with
+!> the same actions at the same steps has the same bits, whoever records them. Parameters, velocities and forces hold until
 !> they are given others; a stage that begins sets gravity, drag and friction as the namelist says.
 !>
 !> In a file each action is a line: its step and kind, a name if the kind has one, the number of identifiers and the
@@ -13,17 +13,17 @@ module polydem_actions
    implicit none
    private
    public :: action_t, actions_t, action_kind_t, action_kinds, kind_of, new_action, line_of, read_action, text_of
-   public :: wall_velocity, wall_load, gravity, drag, friction, force, end_stage, end_run
+   public :: wall_velocity, wall_load, gravity, drag, friction, force, add_bodies, remove_bodies, end_stage, end_run
 
    !> A kind of actions
    type :: action_kind_t
       !> Name in files
       character(len=13) :: name
       !> What its name is the name of; empty: it has none
-      character(len=4) :: object
-      !> Whether it has identifiers of bodies
+      character(len=8) :: object
+      !> Whether it has identifiers of bodies, or numbers of corners of bodies that enter
       logical :: has_bodies
-      !> Number of values, of those with identifiers for each of them
+      !> Number of values, of those with identifiers for each of them; negative: any number
       integer :: n_values
       !> The values with their units
       character(len=80) :: meaning
@@ -31,7 +31,7 @@ module polydem_actions
 
    !> Kinds by their numbers in the table
    integer, parameter :: wall_velocity = 1, wall_load = 2, gravity = 3, drag = 4, friction = 5, force = 6, &
-      end_stage = 7, end_run = 8
+      add_bodies = 7, remove_bodies = 8, end_stage = 9, end_run = 10
    !> Table of kinds
    type(action_kind_t), parameter :: action_kinds(*) = [ &
       action_kind_t('wall_velocity', 'wall', .false., 5, 'velocity [m/s], angular velocity [rad/s], its pivot [m]'), &
@@ -40,6 +40,8 @@ module polydem_actions
       action_kind_t('drag', '', .false., 1, 'rate of the drag [1/s]'), &
       action_kind_t('friction', '', .false., 1, 'factor of the friction coefficients of the namelist'), &
       action_kind_t('force', '', .true., 3, 'force [N/m] and torque [N] on each body'), &
+      action_kind_t('add', 'material', .true., -1, 'density; velocity, angular velocity and corners of each body'), &
+      action_kind_t('remove', '', .true., 0, 'bodies that leave'), &
       action_kind_t('end_stage', '', .false., 0, 'the next step is the last of the present stage'), &
       action_kind_t('end_run', '', .false., 0, 'the next step is the last of the run')]
 
@@ -49,9 +51,9 @@ module polydem_actions
       integer(lp) :: step = 0_lp
       !> Number of its kind
       integer :: kind = 0
-      !> Name of the wall or load
+      !> Name of the wall, load or material
       character(len=:), allocatable :: name
-      !> Identifiers of bodies
+      !> Identifiers of bodies, or numbers of corners
       integer(ip), allocatable :: id(:)
       !> Values, those of each body in turn
       real(wp), allocatable :: value(:)
@@ -159,7 +161,7 @@ contains
          call raise(error, input_error, kind//': the name of the '//trim(known%object)//' is missing')
       else if (known%has_bodies .neqv. size(id) > 0) then
          call raise(error, input_error, kind//': identifiers of bodies are missing, or not allowed')
-      else if (size(value) /= wanted) then
+      else if (size(value) /= wanted .and. wanted >= 0) then
          call raise(error, input_error, kind//': it has '//to_text(int(size(value), ip))//' values, not '// &
             to_text(int(wanted, ip))//': '//trim(known%meaning))
       else if (any(id < 1_lp .or. id > int(huge(1_ip), lp))) then

@@ -1,11 +1,12 @@
 !> What actions do to a simulation. An action that is not possible is an error before anything changes.
 module polydem_perform_actions
-   use polydem_actions, only: action_kinds, action_t, drag, end_run, end_stage, force, friction, gravity, wall_load, &
-      wall_velocity
+   use polydem_actions, only: action_t, add_bodies, drag, end_stage, force, friction, gravity, remove_bodies, &
+      wall_load, wall_velocity
    use polydem_begin_stage, only: find_last_steps, use_parameters
    use polydem_changed_gravity, only: change_gravity
    use polydem_choose_step, only: greatest_change
    use polydem_errors, only: error_t, input_error, raise, run_error
+   use polydem_exchanged_bodies, only: check_addition, removed_after
    use polydem_give_velocity, only: give_velocity
    use polydem_kinds, only: ip, lp, wp
    use polydem_local_data, only: list_moving
@@ -32,7 +33,7 @@ contains
       do while (self%actions%next <= self%actions%n)
          if (self%actions%list(self%actions%next)%step > self%step) return
          action = self%actions%list(self%actions%next)
-         call check_action(self, action, error)
+         call check_action(self, action, self%actions%next - 1, error)
          if (allocated(error)) then
             error%message = self%actions%place(self%actions%next)//': '//error%message
             error%code = run_error
@@ -95,12 +96,15 @@ contains
             self%stages%friction_scale = value(1)
          case (force)
             call self%body_forces%give(action%id, reshape(value, [3, size(action%id)]))
+         case (add_bodies, remove_bodies)
+            ! They enter and leave with those of sources and sinks.
+            return
          case (end_stage)
             self%stages%is_decided = .true.
             self%stages%last = min(self%stages%last, action%step + 1_lp)
             call find_last_steps(self)
             return
-         case (end_run)
+         case default
             self%actions%last_step = min(self%actions%last_step, action%step + 1_lp)
             call find_last_steps(self)
             return
@@ -130,10 +134,12 @@ contains
    end subroutine set_load
 
    !> Check that an action is possible now. Collective; all ranks get the same error.
-   subroutine check_action(self, action, error)
+   subroutine check_action(self, action, before, error)
       type(simulation_t), intent(inout) :: self
       !> An action as `new_action` makes it
       type(action_t), intent(in) :: action
+      !> Number of the actions before it
+      integer, intent(in) :: before
       !> Says why it is not
       type(error_t), allocatable, intent(inout) :: error
 
@@ -151,11 +157,49 @@ contains
             if (value(1) < 0.0_wp) call raise(error, input_error, 'a factor of the friction is not negative')
          case (force)
             call check_bodies(self, action%id, error)
+         case (add_bodies)
+            call check_exchange(self, error)
+            if (.not. allocated(error)) call check_addition(self, action, before, error)
+            call self%comm%all_reduce_error(error)
+         case (remove_bodies)
+            call check_exchange(self, error)
+            if (.not. allocated(error)) call check_bodies(self, action%id, error)
+            if (.not. allocated(error)) call check_bodies_stay(self, action%id, before, error)
          case (end_stage)
             if (self%stages%number == 0_ip) call raise(error, input_error, 'the run has no stages')
+         case default
+            ! Gravity may have any value, and a run may always end.
+            return
          end select
       end associate
    end subroutine check_action
+
+   !> Check that bodies may enter and leave.
+   subroutine check_exchange(self, error)
+      type(simulation_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (.not. allocated(self%traffic)) call raise(error, input_error, 'the run does not expect that bodies enter '// &
+         'or leave: make it with exchange=True')
+   end subroutine check_exchange
+
+   !> Check that no action before has removed bodies.
+   subroutine check_bodies_stay(self, id, before, error)
+      type(simulation_t), intent(in) :: self
+      !> Their identifiers
+      integer(ip), intent(in) :: id(:)
+      !> Number of the actions before
+      integer, intent(in) :: before
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip), allocatable :: removed(:)
+      integer(ip) :: k
+
+      removed = removed_after(self%actions, self%step, before)
+      do k = 1_ip, size(removed, kind=ip)
+         if (any(removed(k) == id)) call raise(error, input_error, 'the body '//to_text(removed(k))// &
+                                              ' is removed already')
+      end do
+   end subroutine check_bodies_stay
 
    !> Check that a wall can be given a velocity.
    subroutine check_wall(self, name, velocity, spin, error)

@@ -13,6 +13,7 @@ module polydem_exchange_bodies
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
+   use polydem_exchanged_bodies, only: append_added, number_added, removed_after
    use polydem_force_sums, only: energy_of_contact
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
@@ -41,7 +42,8 @@ contains
       logical, allocatable :: kept(:)
       integer, allocatable :: origin(:)
 
-      if (.not. self%traffic%has_event(self%step)) return
+      if (.not. (self%traffic%has_event(self%step) .or. size(removed_after(self%actions, self%step)) > 0 .or. &
+                 number_added(self%actions, self%step) > 0)) return
       call find_leaving(self)
       call list_departures(self, departing, kept)
       list%rank = self%comm%rank
@@ -84,6 +86,7 @@ contains
       call comm%gather(real(added%mass, dp), mass, counts)
       order = ascending_order(index)
       do k = 1, size(order)
+         if (origin(k) == 0) cycle
          associate (source => sources(origin(k)))
             source%mass = source%mass + real(mass(order(k)), wp)
          end associate
@@ -144,16 +147,22 @@ contains
       integer(lp), allocatable :: mine(:), all_of_them(:)
       real(dp), allocatable :: values(:), all_values(:)
       integer(ip), allocatable :: counts(:), order(:)
-      integer(ip) :: k, material, w
+      integer(ip), allocatable :: removed(:)
+      integer(ip) :: j, k, material, w
 
       allocate (kept(self%bodies%n), source=.true.)
       allocate (departing%id(0), departing%sink(0), departing%value(number_of_values, 0))
-      if (.not. self%traffic%has_departures(self%step)) return
+      removed = removed_after(self%actions, self%step)
+      if (.not. self%traffic%has_departures(self%step) .and. size(removed) == 0) return
       allocate (mine(0), values(0))
       do k = 1_ip, size(self%bodies%free, kind=ip)
          associate (s => self%bodies%free(k), bodies => self%bodies)
-            w = sink_of(bodies%position(:, s))
-            if (w == 0_ip) cycle
+            w = sink_of(self, bodies%position(:, s))
+            if (w == 0_ip) then
+               j = place_in(removed, bodies%id(s))
+               if (j > size(removed)) cycle
+               if (removed(j) /= bodies%id(s)) cycle
+            end if
             kept(s) = .false.
             mine = [mine, int(bodies%id(s), lp), int(w, lp)]
             material = 0_ip
@@ -173,27 +182,22 @@ contains
          departing%value(:, k) = all_values((order(k) - 1)*number_of_values + 1:order(k)*number_of_values)
       end do
 
-   contains
-
-      !> Number of the first sink in which a point or a copy of it is; 0: none
-      pure integer(ip) function sink_of(point)
-         real(wp), intent(in) :: point(2)
-         integer(ip) :: j
-
-         do j = 1_ip, size(self%traffic%sinks, kind=ip)
-            associate (sink => self%traffic%sinks(j))
-               if (copies_within(self%bodies%cell, sink%settings%low, sink%settings%high, point) > 0_ip) then
-                  if (is_due(sink%settings%interval, sink%stage, self%step, self%stages%number)) then
-                     sink_of = j
-                     return
-                  end if
-               end if
-            end associate
-         end do
-         sink_of = 0_ip
-      end function sink_of
-
    end subroutine list_departures
+
+   !> Number of the first sink in which a body or a copy of it is; 0: none
+   pure integer(ip) function sink_of(self, point) result(number)
+      type(simulation_t), intent(in) :: self
+      !> Place of the body [m]
+      real(wp), intent(in) :: point(2)
+
+      do number = 1_ip, size(self%traffic%sinks, kind=ip)
+         associate (sink => self%traffic%sinks(number))
+            if (copies_within(self%bodies%cell, sink%settings%low, sink%settings%high, point) == 0_ip) cycle
+            if (is_due(sink%settings%interval, sink%stage, self%step, self%stages%number)) return
+         end associate
+      end do
+      number = 0_ip
+   end function sink_of
 
    !> List the bodies that enter before the next step. Collective.
    subroutine list_entries(self, n_leaving, kept, list, origin)
@@ -213,6 +217,7 @@ contains
       integer :: k, n_entered
 
       allocate (circles(3, 0), origin(0))
+      if (number_added(self%actions, self%step) > 0) call admit_added(self, circles, list, origin)
       do k = 1, size(self%traffic%sources)
          associate (source => self%traffic%sources(k))
             if (.not. is_due(source%settings%interval, source%stage, self%step, self%stages%number)) cycle
@@ -231,6 +236,30 @@ contains
          end associate
       end do
    end subroutine list_entries
+
+   !> Append the bodies that actions add, before those of sources.
+   subroutine admit_added(self, circles, list, origin)
+      type(simulation_t), intent(in) :: self
+      !> Circles around the bodies that enter; those of these are appended
+      real(wp), allocatable, intent(inout) :: circles(:, :)
+      type(body_list_t), intent(inout) :: list
+      !> Number of the source of each body that enters; 0: none
+      integer, allocatable, intent(inout) :: origin(:)
+      type(body_list_t) :: whole
+      type(bodies_t) :: added
+      type(error_t), allocatable :: known
+      integer(ip) :: k
+
+      call append_added(self%settings, self%bodies%cell, self%actions, self%step, self%actions%n, list)
+      ! All ranks must know their circles.
+      call append_added(self%settings, self%bodies%cell, self%actions, self%step, self%actions%n, whole)
+      call new_bodies(whole, added, known)
+      if (allocated(known)) return
+      do k = 1_ip, added%n
+         circles = reshape([circles, added%position(:, k), added%radius(k)], [3, size(circles, 2) + 1])
+         origin = [origin, 0]
+      end do
+   end subroutine admit_added
 
    !> Mark the places at which a candidate would meet a body of this rank.
    subroutine mark_blocked(self, source, candidates, kept, is_blocked)

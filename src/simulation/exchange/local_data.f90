@@ -90,6 +90,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> All walls, of which motions or loads drive some
       type(wall_t), intent(in) :: walls(:)
+      !> The slots, in this order
       integer(ip), allocatable, intent(out) :: moving(:)
       !> Number of slots before the halo bodies
       integer(ip), intent(out) :: n_moving

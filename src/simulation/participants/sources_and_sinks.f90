@@ -3,6 +3,7 @@ module polydem_sources_and_sinks
    use polydem_changed_bodies, only: expect_changes
    use polydem_errors, only: error_t
    use polydem_exchange_bodies, only: exchange_bodies, find_leaving
+   use polydem_exchanged_bodies, only: removed_after
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_t, simulation_t
    implicit none
@@ -49,6 +50,8 @@ contains
       associate (unused => self)
       end associate
       needs_table = simulation%traffic%has_departures(simulation%step)
+      if (allocated(simulation%actions)) needs_table = needs_table .or. &
+         size(removed_after(simulation%actions, simulation%step)) > 0
    end function needs_table
 
    !> Serialize the state of all sources and sinks.
