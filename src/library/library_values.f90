@@ -58,9 +58,8 @@ contains
    function polydem_integer(error, handle, name) bind(C) result(value)
       type(c_ptr), value :: error
       type(c_ptr), value :: handle
-      !> step, n_steps (of the whole run, as far as known), stage (number from 1; 0: none), bodies, contacts, threads, next_id
-      !> (identifier of the next body that is added),
-      !> is_over (1: all steps are done)
+      !> step, n_steps (of the whole run, as far as known), stage (number from 1; 0: none), bodies, contacts, threads,
+      !> next_id (identifier of the next body that is added), is_over (1: all steps are done)
       type(c_ptr), value :: name
       integer(c_long) :: value
       type(error_handle_t), pointer :: e

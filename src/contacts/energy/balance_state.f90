@@ -26,6 +26,8 @@ contains
       call serializer%field('/run/departed_totals', sums%departed, '1', 'totals of the bodies that have left')
       call serializer%field('/run/carried_impulse', sums%carried, 'N s/m', &
                         'impulse of gravity on them, less what bodies that entered have not felt, and its scale')
+      call serializer%field('/run/former_gravity', sums%former_gravity, 'm/s2', &
+                        'gravity before its last change, and number of accumulated steps then')
       call serializer%field('/run/exchanged_energy', sums%exchanged, 'J/m', &
                         'energy that bodies brought when they entered, and that others took when they left')
    end subroutine serialize_balance

@@ -65,6 +65,8 @@ module polydem_energy_balance
       real(wp) :: carried(3) = 0.0_wp
       !> Energy that bodies brought when they entered, and that others took when they left [J/m]
       real(wp) :: exchanged(2) = 0.0_wp
+      !> Gravity before its last change [m/s2], and number of accumulated steps then
+      real(wp) :: former_gravity(3) = -1.0_wp
    end type energy_balance_t
 
    !> Terms and residuals of the balance at one time

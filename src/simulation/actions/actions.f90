@@ -1,8 +1,8 @@
 !> Actions: what a program that holds a simulation, or a file of its actions, changes between two steps.
 !>
 !> An action is recorded with the number of steps done, and takes effect at the begin of the next step. So a run with
-!> the same actions at the same steps has the same bits, whoever records them. Parameters, velocities and forces hold until
-!> they are given others; a stage that begins sets gravity, drag and friction as the namelist says.
+!> the same actions at the same steps has the same bits, whoever records them. Parameters, velocities and forces hold
+!> until they are given others; a stage that begins sets gravity, drag and friction as the namelist says.
 !>
 !> In a file each action is a line: its step and kind, a name if the kind has one, the number of identifiers and the
 !> identifiers if it has them, and its values in SI units. A real number has as many digits as its bits need.

@@ -8,6 +8,7 @@ module polydem_exchange_bodies
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_cell, only: cell_t, copies_within, shear_flow
    use polydem_changed_bodies, only: count_entering, find_leaving_totals, n_totals, take_leaving
+   use polydem_changed_gravity, only: last_gravity, undo_change
    use polydem_communicator, only: communicator_t
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t
@@ -19,7 +20,7 @@ module polydem_exchange_bodies
    use polydem_ownership, only: owns_pair
    use polydem_replace_bodies, only: replace_bodies
    use polydem_room, only: list_near, meets_any, meets_fixed, put_candidates
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: simulation_t, time_of
    use polydem_sort, only: ascending_order, place_in
    use polydem_source, only: candidate_t, source_t
    use polydem_traffic, only: departure_t, is_due, number_of_values
@@ -52,7 +53,8 @@ contains
       call list_entries(self, size(departing%id, kind=lp), kept, list, origin)
       if (size(departing%id) > 0) then
          if (self%settings%output%energy_balance) then
-            call take_leaving(self%energy_balance, self%dt, self%forces%gravity, &
+            call undo_change(self%energy_balance, self%comm, self%dt, self%forces%gravity, self%bodies, .not. kept)
+            call take_leaving(self%energy_balance, self%dt, last_gravity(self%energy_balance, self%forces%gravity), &
                               self%traffic%leaving(:n_totals))
             call release_energy(self%energy_balance, self%traffic%leaving(n_totals + 1))
          end if
@@ -109,13 +111,16 @@ contains
       if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
       call list_departures(self, departing, kept)
       if (size(departing%id) == 0) return
-      call find_leaving_totals(self%energy_balance, self%comm, self%forces%gravity, self%bodies, &
+      call find_leaving_totals(self%energy_balance, self%comm, &
+                               last_gravity(self%energy_balance, self%forces%gravity), self%bodies, &
                                self%loop%force_sums, self%loop%walls, .not. kept, total)
       associate (contacts => self%contacts, bodies => self%bodies)
          if (self%loop%walls%energy_is_known) then
             do c = 1_ip, contacts%n
                if (.not. owns_pair(bodies, contacts%row(c)%first, contacts%row(c)%second)) cycle
                if (stays(contacts%row(c)%first) .and. stays(contacts%row(c)%second)) cycle
+               ! The energy of a contact with a wall that is removed now leaves with the wall.
+               if (is_removed(contacts%row(c)%first) .or. is_removed(contacts%row(c)%second)) cycle
                call released(1)%add(energy_of_contact(contacts, c))
             end do
          end if
@@ -124,6 +129,17 @@ contains
       self%traffic%leaving = [total, released%value()]
 
    contains
+
+      !> Whether a body is of a wall that is removed before the next step
+      pure logical function is_removed(s)
+         integer(ip), intent(in) :: s
+         integer(ip) :: wall
+
+         is_removed = .false.
+         wall = self%walls%wall_of(s)
+         if (wall > 0_ip) is_removed = time_of(self) >= self%walls%wall(wall)%vanish_at .and. &
+            .not. self%walls%wall(wall)%is_removed
+      end function is_removed
 
       !> Whether a body stays, also one of another rank
       pure logical function stays(s)

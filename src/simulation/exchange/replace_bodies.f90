@@ -100,6 +100,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: s
 
+      ! The contacts are those of no step until the next one finds them.
+      self%loop%step = -1_lp
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
       call rebuild_local_data(self, error, self%domain%median_diameter)
       call set_global_limits(self)

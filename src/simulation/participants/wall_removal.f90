@@ -10,6 +10,7 @@ module polydem_wall_removal
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
+   use polydem_exchange_bodies, only: find_leaving
    use polydem_force_sums, only: sum_energy
    use polydem_kinds, only: ip, wp
    use polydem_replace_bodies, only: hold_history, rebuild_bodies
@@ -38,6 +39,8 @@ contains
       associate (unused => self, walls => simulation%walls)
          if (.not. walls%any_removed_at(time_of(simulation))) return
          call find_release(simulation)
+         ! The contacts of bodies that leave in this step will not be known any more.
+         call find_leaving(simulation)
          call release_energy(simulation%energy_balance, walls%released)
          walls%released = 0.0_wp
          call hold_history(simulation)
