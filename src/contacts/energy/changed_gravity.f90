@@ -38,6 +38,7 @@ contains
 
    !> Whether gravity has changed since the last accumulated step
    pure logical function is_new(sums)
+      !> Running sums
       type(energy_balance_t), intent(in) :: sums
 
       is_new = nint(sums%former_gravity(3), lp) == sums%steps
@@ -45,6 +46,7 @@ contains
 
    !> Gravity of the last accumulated step, which bodies have felt that leave before the next one (2) [m/s2]
    pure function last_gravity(sums, gravity) result(last)
+      !> Running sums
       type(energy_balance_t), intent(in) :: sums
       !> Present acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
@@ -74,9 +76,12 @@ contains
 
    !> Change the values at the start by a jump of gravity that acts on some bodies. Collective.
    subroutine change_start(sums, comm, dt, jump, bodies, slots, sign)
+      !> Running sums
       type(energy_balance_t), intent(inout) :: sums
       class(communicator_t), intent(inout) :: comm
+      !> Time step [s], and the jump [m/s2]
       real(wp), intent(in) :: dt, jump(2)
+      !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
