@@ -392,6 +392,34 @@ def test_bodies_do_not_leave_unless_the_run_expects_it(free):
             act()
 
 
+def test_several_processes_are_refused_with_the_way_to_have_them():
+    class Comm:
+        size = 3
+
+    with pytest.raises(polydem.InputError, match="--ranks N --actions"):
+        polydem.Simulation(FREE, comm=Comm())
+
+
+def test_a_gate_that_opens_when_bodies_leave_closes_the_balance():
+    def wall(low, high, **more):
+        return {"outline": "rectangle", "low": low, "high": high, **more}
+
+    residuals = []
+    for vanish in (0.2, 0.1999):
+        groups = {"wall": {"floor": wall((-0.2, -0.02), (0.2, 0.0)), "left": wall((-0.05, 0.0), (-0.03, 0.05)),
+                           "gate": wall((0.03, 0.0), (0.05, 0.05), vanish_at=vanish)},
+                  "grains": {"few": {"region": "box", "low": (-0.03, 0.001), "high": (0.03, 0.05), "number": 16}},
+                  "sink": {"out": {"low": (-0.03, 0.0), "high": (0.03, 0.012), "interval": 10000}},
+                  "integrate": {"duration": 0.3, "dt": 2e-5}}
+        with polydem.Simulation(groups) as sim:
+            sim.run(until=0.1998)
+            before = sim.energy["energy_residual"], len(sim.bodies)
+            sim.run(until=0.2002)
+            residuals.append(sim.energy["energy_residual"] - before[0])
+            assert len(sim.bodies) < before[1] - 5
+    assert residuals[0] == pytest.approx(residuals[1], abs=1e-8)
+
+
 @pytest.mark.parametrize(("lines", "message"), [
     ("gravity 0 1", ":1: the line begins with \"gravity\""),
     ("5 gravity 0", ":1: gravity: it has 1 values, not 2"),

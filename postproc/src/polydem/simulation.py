@@ -172,6 +172,7 @@ class Simulation:
         folder     folder of the result, which is that of `polydem run`; None: nothing is written
         force, resume  whether a result in the folder is replaced, or continued
         exchange   whether bodies may be added and removed
+        comm       None: a simulation in Python computes in one process
 
     Use it in a `with` statement, or call `close`. A simulation with a folder that is closed before its end is
     interrupted and can be resumed. Values are copies. One thread at a time may use a simulation.
@@ -180,11 +181,14 @@ class Simulation:
     def __init__(self, source: str | PathLike[str] | Mapping[str, Any],
                  overrides: Mapping[str, Any] | None = None, *, threads: int = 1,
                  folder: str | PathLike[str] | None = None, force: bool = False, resume: bool = False,
-                 exchange: bool = False):
+                 exchange: bool = False, comm: Any = None):
         self._observers: list[tuple[int, Observer]] = []
         self._stop: str | None = None
         if force and resume:
             raise InputError("force starts the run again, resume goes on with it: choose one")
+        if comm is not None and getattr(comm, "size", 1) != 1:
+            raise InputError("a simulation in Python computes in one process; record its actions, and repeat them with "
+                             "polydem run --ranks N --actions FILE")
         if (force or resume) and folder is None:
             raise InputError("force and resume need a folder")
         words = [override(entry, value).encode() for entry, value in (overrides or {}).items()]
