@@ -258,14 +258,15 @@ with polydem.Simulation(scene, {"checkpoint.steps": 150, "checkpoint.wall_interv
 
 def run_script(scene, folder, path, *, mode="new", kill=0, threads=1, held=""):
     """Run the script above; its state hash, or None if it was killed."""
-    done = subprocess.run([sys.executable, "-c", SCRIPT, str(scene), str(folder or ""), mode, str(kill), str(threads), held,
-                           str(path)], check=False, capture_output=True, text=True)
+    words = [str(scene), str(folder or ""), mode, str(kill), str(threads), held, str(path)]
+    done = subprocess.run([sys.executable, "-c", SCRIPT, *words], check=False, capture_output=True, text=True)
     assert done.returncode == (-signal.SIGKILL if kill else 0), done.stderr
     return done.stdout.strip() or None
 
 
-@pytest.mark.parametrize(("name", "held"), [("first", ""), ("gate", ""), ("biaxial", "right,top"), ("steady_hopper", ""),
-                                            ("shaken_bed", ""), ("two_materials", ""), ("concave_grains", "")])
+@pytest.mark.parametrize(("name", "held"), [
+    ("first", ""), ("gate", ""), ("biaxial", "right,top"), ("steady_hopper", ""), ("shaken_bed", ""),
+    ("two_materials", ""), ("concave_grains", "")])
 def test_the_program_repeats_a_script(tmp_path, name, held):
     scene = ROOT / "inputs" / f"{name}.nml"
     actions = tmp_path / "actions.txt"

@@ -8,6 +8,7 @@ from .blocks import BlockAverage, ShortSeries, block_average
 from .fields import Fields, Kernel, coarse_grain, gaussian, lucy
 from .flow import FlowRate, flow_rate, mass_beyond
 from .fraction import solid_fraction
+from .loops import ContactLoops, contact_loops
 from .mixing import lacey_index
 from .motion import Displacements, mean_squared_displacement
 from .network import (
@@ -26,10 +27,10 @@ from .surface import Surface, SurfaceAngle, free_surface, surface_angle
 from .windows import Window, rectangle
 
 __all__ = [
-    "Anisotropy", "BlockAverage", "Displacements", "Distribution", "Fields", "FlowRate", "Kernel", "Profile",
-    "ShortSeries", "Stress", "Surface", "SurfaceAngle", "Window", "anisotropy", "block_average", "body_stress",
-    "coarse_grain", "coordination_number", "fabric_tensor", "flow_rate", "force_distribution", "free_surface",
-    "gaussian", "inertial_number", "lacey_index", "lucy", "mass_beyond", "mean_squared_displacement", "profile",
-    "rattlers", "rectangle", "sample_fraction", "sample_stress", "shear_rate", "solid_fraction",
-    "stress_tensor", "surface_angle", "unbalanced_force",
+    "Anisotropy", "BlockAverage", "ContactLoops", "Displacements", "Distribution", "Fields", "FlowRate",
+    "Kernel", "Profile", "ShortSeries", "Stress", "Surface", "SurfaceAngle", "Window", "anisotropy",
+    "block_average", "body_stress", "coarse_grain", "contact_loops", "coordination_number", "fabric_tensor",
+    "flow_rate", "force_distribution", "free_surface", "gaussian", "inertial_number", "lacey_index", "lucy",
+    "mass_beyond", "mean_squared_displacement", "profile", "rattlers", "rectangle", "sample_fraction",
+    "sample_stress", "shear_rate", "solid_fraction", "stress_tensor", "surface_angle", "unbalanced_force",
 ]

@@ -15,6 +15,7 @@ from ..base.polygons import FloatArray, IntArray, following, join, moments
 from ..base.result_file import ResultError, insist
 from ..bodies_file import write_frame
 from .contacts import Contacts, Walls
+from .graphs import contact_graph, freud_system
 from .tables import body_table
 
 #: What a contact has of its own; the rest follows from the bodies
@@ -368,6 +369,14 @@ class Frame:
     def to_pandas(self) -> Any:
         """The bodies as a pandas table with the identifiers as index; vectors become two columns (position_x)."""
         return body_table(self)
+
+    def to_networkx(self) -> Any:
+        """Bodies and contacts as a `networkx.MultiGraph`: nodes are identifiers, with the columns as attributes."""
+        return contact_graph(self)
+
+    def to_freud(self) -> Any:
+        """((box, points), neighbours) of the free bodies for freud: `RDF().compute(system, neighbors=neighbours)`."""
+        return freud_system(self)
 
 
 @dataclass(frozen=True)
