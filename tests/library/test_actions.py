@@ -14,6 +14,13 @@ from polydem_post import Trajectory
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 PROGRAM = os.environ["POLYDEM_PROGRAM"]
 SQUARE = np.array([(0.0, 0.0), (0.01, 0.0), (0.01, 0.01), (0.0, 0.01)])
+
+
+def square(x, y):
+    """A square with its lower left corner at a place."""
+    return SQUARE + np.array([x, y])
+
+
 #: Two walls far below and above, and two grains that meet nothing
 FREE = {
     "wall": {"floor": {"outline": "rectangle", "low": (-0.1, -0.62), "high": (0.1, -0.6)},
@@ -175,9 +182,9 @@ def test_bodies_enter_and_leave():
         sim.run(5)
         former = sim.bodies.id
         kinetic = sim.energy["kinetic"]
-        ids = sim.add([SQUARE + (0.2, 0), SQUARE[:3] - (0.3, 0.1)], velocity=[(0.1, 0), (0, 0.2)], angular_velocity=2.0,
+        ids = sim.add([square(0.2, 0), SQUARE[:3] - (0.3, 0.1)], velocity=[(0.1, 0), (0, 0.2)], angular_velocity=2.0,
                       density=1000.0)
-        more = sim.add([SQUARE + (0.3, 0)])
+        more = sim.add([square(0.3, 0)])
         assert np.array_equal(ids, former.max() + np.array([1, 2]))
         assert more[0] == ids[1] + 1
         sim.run(100)
@@ -195,13 +202,13 @@ def test_bodies_enter_and_leave():
         assert np.array_equal(sim.bodies.id, [*former, *more])
         assert sim.energy["departed_energy"] == pytest.approx(brought, rel=1e-12)
         assert abs(sim.energy["energy_residual"]) < 1e-15
-        assert sim.add([SQUARE + (0.2, 0)])[0] == more[0] + 1
+        assert sim.add([square(0.2, 0)])[0] == more[0] + 1
 
 
 def test_added_grains_fall_on_others_and_their_energy_closes():
     with polydem.Simulation(ROOT / "inputs/first.nml", exchange=True) as sim:
         sim.run(1500)
-        sim.add([SQUARE + (x, 0.35) for x in (-0.03, 0.0, 0.03)], velocity=(0, -1.0))
+        sim.add([square(x, 0.35) for x in (-0.03, 0.0, 0.03)], velocity=(0, -1.0))
         sim.run(1500)
         free = sim.bodies.id[~sim.bodies.fixed]
         sim.remove(free[:50])
@@ -364,11 +371,11 @@ BAD = [
     (lambda s: s.add([SQUARE[[0, 2, 1, 3]] + (1, 1)]), "convex|itself|cross"),
     (lambda s: s.add([SQUARE[:2]]), "three corners"),
     (lambda s: s.add([[1, 2, 3]]), "outline"),
-    (lambda s: s.add([SQUARE + (0, -0.61)]), "overlaps the body 3"),
-    (lambda s: s.add([SQUARE + (1, 1), SQUARE + (1.005, 1)]), "overlaps body"),
-    (lambda s: s.add([SQUARE + (1, 1)], material="glass"), "no material \"glass\""),
-    (lambda s: s.add([SQUARE + (1, 1)], density=-1), "not negative"),
-    (lambda s: s.add([SQUARE + (np.nan, 1)]), "not finite"),
+    (lambda s: s.add([square(0, -0.61)]), "overlaps the body 3"),
+    (lambda s: s.add([square(1, 1), square(1.005, 1)]), "overlaps body"),
+    (lambda s: s.add([square(1, 1)], material="glass"), "no material \"glass\""),
+    (lambda s: s.add([square(1, 1)], density=-1), "not negative"),
+    (lambda s: s.add([square(np.nan, 1)]), "not finite"),
     (lambda s: s.remove([4]), "body 4 is fixed"),
     (lambda s: s.remove([77]), "no body 77"),
 ]
@@ -388,7 +395,7 @@ def test_a_wrong_action_is_an_exception_before_anything_changes(k):
 
 
 def test_bodies_do_not_leave_unless_the_run_expects_it(free):
-    for act in (lambda: free.remove([1]), lambda: free.add([SQUARE + (1, 1)])):
+    for act in (lambda: free.remove([1]), lambda: free.add([square(1, 1)])):
         with pytest.raises(polydem.InputError, match="exchange=True"):
             act()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import threading
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_long, c_void_p
 from functools import cache
 from pathlib import Path
@@ -71,21 +72,38 @@ def _declare(library: ctypes.CDLL, name: str, result: Any, arguments: list[Any])
     function.restype, function.argtypes = result, arguments
 
 
+class _Errors(threading.local):
+    """An error handle for each thread."""
+
+    def __init__(self) -> None:
+        self._handle: c_void_p | None = None
+
+    def handle(self) -> c_void_p:
+        """The handle of this thread, made when it is needed first."""
+        if self._handle is None:
+            self._handle = c_void_p(load().polydem_new_error())
+        return self._handle
+
+    def __del__(self) -> None:
+        if self._handle is not None:
+            load().polydem_delete_error(byref(self._handle))
+
+
+_ERRORS = _Errors()
+
+
 def call(name: str, *arguments: Any) -> Any:
     """Call a function that may fail; its error becomes an exception."""
     library = load()
-    error = c_void_p(library.polydem_new_error())
-    try:
-        result = getattr(library, f"polydem_{name}")(error, *arguments)
-        code = library.polydem_error_code(error)
-        if code != 0:
-            size = library.polydem_error_message(error, None, 0) + 1
-            buffer = ctypes.create_string_buffer(size)
-            library.polydem_error_message(error, buffer, size)
-            raise BY_CODE.get(code, PolydemError)(buffer.value.decode(errors="replace"))
-        return result
-    finally:
-        library.polydem_delete_error(byref(error))
+    error = _ERRORS.handle()
+    result = getattr(library, f"polydem_{name}")(error, *arguments)
+    code = library.polydem_error_code(error)
+    if code != 0:
+        size = library.polydem_error_message(error, None, 0) + 1
+        buffer = ctypes.create_string_buffer(size)
+        library.polydem_error_message(error, buffer, size)
+        raise BY_CODE.get(code, PolydemError)(buffer.value.decode(errors="replace"))
+    return result
 
 
 def version() -> str:

@@ -19,6 +19,8 @@ from .namelist import override, write_namelist
 
 #: Elapsed time of a call of the library, after which Python looks for Ctrl-C [s]
 PATIENCE = 0.1
+#: More steps than a run has
+FOREVER = 2**62
 #: What becomes of a result that is in the folder, as in polydem.h
 NEW, FORCE, CONTINUE = 0, 1, 2
 #: Added to one of them: bodies may enter and leave
@@ -249,21 +251,24 @@ class Simulation:
             # Rounding does not make a whole number of steps one step longer.
             end = max(begin, math.ceil(time / dt * (1.0 - 1e-12)))
         self._stop = None
-        while self._stop is None and not self.is_over and (end is None or self.step < end):
-            self._advance_to(end)
-        return self.step - begin
+        now, done = begin, 1
+        while self._stop is None and done > 0 and (end is None or now < end):
+            done = self._advance(now, FOREVER if end is None else end)
+            now += done
+        return now - begin
 
-    def _advance_to(self, end: int | None) -> None:
-        """Advance to the next call of an observer, or to a step, at most for a moment; call what is due."""
-        now = self.step
-        last = self.n_steps if end is None else min(end, self.n_steps)
+    def _advance(self, now: int, end: int) -> int:
+        """Advance to the next call of an observer, or to a step, at most for a moment; call what is due.
+
+        Return the number of steps done; 0: the run is over.
+        """
         for interval, _ in self._observers:
-            last = min(last, (now // interval + 1) * interval)
-        call("advance", self._handle.open, max(1, last - now), PATIENCE)
-        step = self.step
+            end = min(end, (now // interval + 1) * interval)
+        done = int(call("advance", self._handle.open, end - now, PATIENCE))
         for interval, observer in list(self._observers):
-            if step % interval == 0 and step > now:
+            if done > 0 and (now + done) % interval == 0:
                 observer(self)
+        return done
 
     def every(self, steps: int | None = None, *, seconds: float | None = None) -> Callable[[Observer], Observer]:
         """A decorator: call a function with the simulation after each step whose number is a multiple.

@@ -122,7 +122,7 @@ contains
       if (any(action%id < 3_ip)) then
          call raise(error, input_error, 'a body has at least three corners')
       else if (size(action%value, kind=lp) /= 1_lp + sum(3_lp + 2_lp*int(action%id, lp))) then
-         call raise(error, input_error, 'its values are the density, then velocity, angular velocity and corners of '// &
+         call raise(error, input_error, 'its values are density, then velocity, angular velocity and corners of '// &
                     'each body')
       else if (action%value(1) < 0.0_wp) then
          call raise(error, input_error, 'a density is not negative')
