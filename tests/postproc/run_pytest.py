@@ -38,6 +38,8 @@ def main() -> int:
     environment = dict(os.environ)
     environment["PYTHONPATH"] = str(root / "postproc" / "src")
     environment["PYTHONDONTWRITEBYTECODE"] = "1"
+    # Threads of few bodies wait for each other more than they work.
+    environment.setdefault("OMP_NUM_THREADS", "1")
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
     environment["POLYDEM_PROGRAM"] = str(program)
     environment["POLYDEM_SOURCE_DIR"] = str(root)

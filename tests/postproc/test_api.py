@@ -25,7 +25,7 @@ HEAP = """&scene
    friction_coefficient = 0.5
 /
 &integrate
-   duration = 0.4
+   duration = {duration}
 /
 &output
    frame_interval = 0.05
@@ -35,9 +35,9 @@ HEAP = """&scene
 """
 
 
-def make_run(folder, scene=""):
+def make_run(folder, scene="", duration=0.4):
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "heap.nml").write_text(HEAP.format(scene=scene))
+    (folder / "heap.nml").write_text(HEAP.format(scene=scene, duration=duration))
     subprocess.run([PROGRAM, "run", "heap.nml"], cwd=folder, check=True, capture_output=True)
     return folder / "results" / "heap"
 
@@ -207,17 +207,17 @@ def test_forces_of_bodies_are_the_sums_over_contacts(run):
 def test_flags_say_which_walls_move(run, tmp_path):
     assert not run[0].driven.any() and (run[0].static == run[0].fixed).all()
     motion = "/\n&motion name = '{}' kind = 'translation' velocity = 0.0, 0.01 bodies = {}"
-    moved = make_run(tmp_path, motion.format("a", 61))
+    moved = make_run(tmp_path, motion.format("a", 61), 0.05)
     frame = Trajectory(moved)[-1]
     assert list(frame.id[frame.driven]) == [61]
     assert_array_equal(frame.static, frame.fixed & (frame.id != 61))
     assert frame.speed[frame.driven] == pytest.approx(0.01)
-    two = make_run(tmp_path / "two", motion.format("a", 63) + motion.format("b", "61, 63"))
+    two = make_run(tmp_path / "two", motion.format("a", 63) + motion.format("b", "61, 63"), 0.05)
     frame = Trajectory(two)[-1]
     assert list(frame.id[frame.driven]) == [61, 63]
     assert list(frame.speed[frame.driven]) == pytest.approx([0.01, 0.02])
     every = make_run(tmp_path / "every", motion.format("a", 61).replace("bodies", "start = 9 bodies")
-                     + "/\n&motion name = 'b' kind = 'translation' velocity = 0.0, 0.0")
+                     + "/\n&motion name = 'b' kind = 'translation' velocity = 0.0, 0.0", 0.05)
     assert_array_equal(Trajectory(every)[-1].driven, Trajectory(every)[-1].fixed)
 
 

@@ -21,8 +21,10 @@ CMAKE = ""
 
 #: Entries of a preset that decide on flags alone
 FLAGS = {"CMAKE_BUILD_TYPE"}
-#: No code, so nothing to put into libraries and programs; an empty object says that a source was checked
+#: No code, so nothing to put into libraries and programs; an empty object says that a source was checked. No source has
+#: lines for a preprocessor.
 ONLY_CHECK = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_Fortran_FLAGS_RELEASE=-fsyntax-only", "-DPOLYDEM_TESTS=OFF",
+              "-DCMAKE_Fortran_PREPROCESS=OFF",
               "-DCMAKE_Fortran_COMPILE_OBJECT=<CMAKE_Fortran_COMPILER> <DEFINES> <INCLUDES> <FLAGS> -c <SOURCE> "
               "-o <OBJECT> && touch <OBJECT>",
               "-DCMAKE_Fortran_ARCHIVE_CREATE=<CMAKE_COMMAND> -E touch <TARGET>", "-DCMAKE_Fortran_ARCHIVE_FINISH=",

@@ -45,30 +45,34 @@ contains
       end if
       call table%show('blocks at which a stack buckles, E = 1e7', &
                       (7.837_wp/12.0_wp*1.0e7_wp*width/weight)**(1.0_wp/3.0_wp))
-      ! Quick: each law and each height once
-      call buckle(table, 'area law', area_law, [.true., thorough])
-      call buckle(table, 'default law', '', [thorough, .true.])
+      if (thorough) then
+         call buckle(table, 'area law', area_law, [24_ip, 36_ip], 7)
+         call buckle(table, 'default law', '', [24_ip, 36_ip], 7)
+      else
+         ! At E = 1e6 stacks buckle at 13.9 blocks.
+         call buckle(table, 'area law', area_law, [11_ip, 17_ip], 6)
+         call buckle(table, 'default law', '', [11_ip, 17_ip], 6)
+      end if
       call sink(table, 10_ip)
    end subroutine run_stack
 
    !> A stack below the height at which it buckles stands, and one above it falls.
-   subroutine buckle(table, name, law, tried)
+   subroutine buckle(table, name, law, heights, power)
       type(table_t), intent(inout) :: table
       !> Law in words, and its entries
       character(len=*), intent(in) :: name, law
-      !> Whether the low and the high stack are tried
-      logical, intent(in) :: tried(2)
+      !> Blocks of the low and of the high stack
+      integer(ip), intent(in) :: heights(2)
+      !> Stiffness, as a power of ten [N/m2]
+      integer, intent(in) :: power
+      character(len=:), allocatable :: middle
       real(wp) :: leaning
 
-      if (tried(1)) then
-         call nudge(table, 24_ip, law, leaning)
-         call table%expect_absolute('24 blocks, E = 1e7, '//name//', nudged: the top leans after 2 s by [m]', 0.0_wp, &
-                                    leaning, 0.1_wp*width)
-      end if
-      if (.not. tried(2)) return
-      call nudge(table, 36_ip, law, leaning)
-      call table%expect_true('36 blocks, E = 1e7, '//name//', nudged: the top leans by a width within 2 s', &
-                             leaning > width)
+      middle = ' blocks, E = 1e'//to_text(power)//', '//name//', nudged: the top leans '
+      call nudge(table, heights(1), 10.0_wp**power, law, leaning)
+      call table%expect_absolute(to_text(heights(1))//middle//'after 2 s by [m]', 0.0_wp, leaning, 0.1_wp*width)
+      call nudge(table, heights(2), 10.0_wp**power, law, leaning)
+      call table%expect_true(to_text(heights(2))//middle//'by a width within 2 s', leaning > width)
    end subroutine buckle
 
    !> A stack with the default law from its static depths
@@ -97,16 +101,17 @@ contains
 
    !> Push a stack sideways: its top gets 1 mm/s. Find the distance of the top from the middle after 2 s, or when it
    !> exceeds a width.
-   subroutine nudge(table, n, law, leaning)
+   subroutine nudge(table, n, young, law, leaning)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n
+      real(wp), intent(in) :: young
       character(len=*), intent(in) :: law
       real(wp), intent(out) :: leaning
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       integer(ip) :: k
 
-      call build(n, 1.0e7_wp, 'cundall_strack', law, simulation, error)
+      call build(n, young, 'cundall_strack', law, simulation, error)
       leaning = 0.0_wp
       do k = 1_ip, n
          if (.not. allocated(error)) simulation%bodies%velocity(1, k) = 1.0e-3_wp*real(k, wp)/real(n, wp)
