@@ -149,7 +149,7 @@ def a_frame_is_a_start_without_history(case):
 
 
 def a_stress_controlled_cell_keeps_its_size(case):
-    """Finds a start with bodies that a cell of another size folds back over each other."""
+    """Finds a start with bodies that a cell of another size brings back over each other."""
     cell = "&cell periodic = 'xy' size = {size} {entries} /\n"
     rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 0.015625", scheme="")
     entries = "stress_controlled = 'xy' stress = 2e4, 1e4 mass = 0.02"

@@ -271,7 +271,8 @@ contains
                                             ' cannot turn, since its copies do not')
          do axis = 1, 2
             if (bodies%cell%size(axis) > 0.0_wp .and. abs(velocity(axis)) > 0.0_wp .and. &
-                any(.not. bodies%folds(axis, wall%slots) > 0.0_wp)) call raise(error, input_error, 'the wall '// &
+                any(.not. bodies%inverse_period(axis, wall%slots) > 0.0_wp)) call raise(error, input_error, &
+               'the wall '// &
                wall%name//' spans the cell and cannot move along '//'xy'(axis:axis))
          end do
       end associate

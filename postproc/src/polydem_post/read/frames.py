@@ -228,8 +228,8 @@ class Frame:
             nearest[:, 0] -= np.rint(vectors[:, 1] / self.cell_size[1]) * self.shift
         for axis in np.flatnonzero(self.cell_size > 0.0):
             size = self.cell_size[axis]
-            folded = ~(self.spans[first, axis] | self.spans[second, axis])
-            nearest[folded, axis] -= np.rint(nearest[folded, axis] / size) * size
+            repeats = ~(self.spans[first, axis] | self.spans[second, axis])
+            nearest[repeats, axis] -= np.rint(nearest[repeats, axis] / size) * size
         return nearest
 
     @cached_property
