@@ -179,8 +179,8 @@ contains
       type(simulation_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. allocated(self%traffic)) call raise(error, input_error, 'the run does not expect that bodies enter '// &
-         'or leave: make it with exchange=True')
+      if (.not. allocated(self%sources_and_sinks)) call raise(error, input_error, &
+         'the run does not expect that bodies enter or leave: make it with exchange=True')
    end subroutine check_exchange
 
    !> Check that no action before has removed bodies.
