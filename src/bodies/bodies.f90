@@ -75,7 +75,7 @@ module polydem_bodies
       !> In a sheared cell what `image` lacks: sum of the shifts of the borders that each body has crossed, (slot) [m]
       real(wp), allocatable :: shear_offset(:)
       !> In a periodic cell 1/size for each body and axis, 0 along axes along which it does not repeat, (2, slot) [1/m]
-      real(wp), allocatable :: folds(:, :)
+      real(wp), allocatable :: inverse_period(:, :)
       !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]

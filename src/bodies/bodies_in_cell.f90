@@ -14,7 +14,7 @@ module polydem_bodies_in_cell
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: set_cell, change_cell, find_folds, stretch_bodies, wrap_bodies, follow_shear, put_into_cell, &
+   public :: set_cell, change_cell, find_periods, stretch_bodies, wrap_bodies, follow_shear, put_into_cell, &
              add_profile, path_of
 
 contains
@@ -36,33 +36,34 @@ contains
       real(wp), intent(in) :: dt
       !> Simulated time at the start and at the end of the step [s]
       real(wp), intent(in) :: from, to
-      !> Bodies; their cell and `folds` change
+      !> Bodies; their cell and `inverse_period` change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
       if (allocated(bodies%cell%load)) then
          call grow_cell(dt, bodies%cell)
          do s = 1_ip, bodies%n
-            where (bodies%folds(:, s) > 0.0_wp) bodies%folds(:, s) = bodies%cell%inverse
+            where (bodies%inverse_period(:, s) > 0.0_wp) bodies%inverse_period(:, s) = bodies%cell%inverse
          end do
       end if
       call shear_cell(bodies%cell, from, to)
    end subroutine change_cell
 
    !> Find out along which axes bodies repeat.
-   pure subroutine find_folds(bodies)
-      !> Bodies with turned vertices; `folds` is set in a periodic cell
+   pure subroutine find_periods(bodies)
+      !> Bodies with turned vertices; `inverse_period` is set in a periodic cell
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
       if (.not. bodies%cell%is_periodic) return
-      if (allocated(bodies%folds)) deallocate (bodies%folds)
-      allocate (bodies%folds(2, bodies%n))
+      if (allocated(bodies%inverse_period)) deallocate (bodies%inverse_period)
+      allocate (bodies%inverse_period(2, bodies%n))
       do s = 1_ip, bodies%n
-         bodies%folds(:, s) = bodies%cell%inverse
-         if (bodies%fixed(s)) where (4.0_wp*reach_of(bodies, s) >= bodies%cell%size) bodies%folds(:, s) = 0.0_wp
+         bodies%inverse_period(:, s) = bodies%cell%inverse
+         if (.not. bodies%fixed(s)) cycle
+         where (4.0_wp*reach_of(bodies, s) >= bodies%cell%size) bodies%inverse_period(:, s) = 0.0_wp
       end do
-   end subroutine find_folds
+   end subroutine find_periods
 
    !> Greatest distance of a vertex of a body from its centre along each axis [m]
    pure function reach_of(bodies, s) result(reach)
@@ -172,7 +173,8 @@ contains
 
    !> Put bodies that may be anywhere into the cell. Those that span it stay where they are.
    pure subroutine put_into_cell(bodies, slots)
-      !> Bodies after `find_folds`; `position` and `image` change, in a sheared cell also `velocity` and `shear_offset`
+      !> Bodies after `find_periods`; `position` and `image` change, in a sheared cell also `velocity` and
+      !> `shear_offset`
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
@@ -182,7 +184,7 @@ contains
       do k = 1_ip, size(slots, kind=ip)
          associate (s => slots(k), cell => bodies%cell)
             do axis = 2, 1, -1
-               crossed = floor((bodies%position(axis, s) - cell%low(axis))*bodies%folds(axis, s), ip)
+               crossed = floor((bodies%position(axis, s) - cell%low(axis))*bodies%inverse_period(axis, s), ip)
                bodies%position(axis, s) = bodies%position(axis, s) - real(crossed, wp)*cell%size(axis)
                bodies%image(s, axis) = bodies%image(s, axis) + crossed
                if (crossed /= 0_ip .and. axis == 2) call cross_sheared_border(bodies, s, crossed)

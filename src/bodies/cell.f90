@@ -16,7 +16,7 @@ module polydem_cell
    use polydem_ramp, only: ramp_t, window_t
    implicit none
    private
-   public :: cell_t, cell_load_t, new_cell, grow_cell, nearest_copy, fold_offsets, shear_cell, copies_along_y, &
+   public :: cell_t, cell_load_t, new_cell, grow_cell, minimum_image, find_minimum_images, shear_cell, copies_along_y, &
              shear_flow, into_cell, copies_within
 
    !> Control of the size of a cell by a stress, (x and y)
@@ -178,20 +178,20 @@ contains
       shift = modulo(cell%first_shift + cell%rate*cell%size(2)*ramp%elapsed, cell%size(1))
    end subroutine find_shear
 
-   !> The vector to the nearest copy of where a vector leads [m]
-   pure function nearest_copy(cell, folds, vector) result(nearest)
+   !> The minimum image of a vector: that to the nearest copy of where it leads [m]
+   pure function minimum_image(cell, inverse_period, vector) result(nearest)
       type(cell_t), intent(in) :: cell
-      !> 1/size along both axes, or 0 if the vector is not folded [1/m]
-      real(wp), intent(in) :: folds(2)
+      !> 1/size along both axes, or 0 along axes along which there are no copies [1/m]
+      real(wp), intent(in) :: inverse_period(2)
       !> The vector [m]
       real(wp), intent(in) :: vector(2)
       real(wp) :: nearest(2), copies
 
-      copies = rounded(vector(2)*folds(2))
+      copies = rounded(vector(2)*inverse_period(2))
       nearest(2) = vector(2) - copies*cell%size(2)
       nearest(1) = vector(1) - copies*cell%shift
-      nearest(1) = nearest(1) - rounded(nearest(1)*folds(1))*cell%size(1)
-   end function nearest_copy
+      nearest(1) = nearest(1) - rounded(nearest(1)*inverse_period(1))*cell%size(1)
+   end function minimum_image
 
    !> Motion of the shear at a height: velocity along x and y [m/s], and rate of turn [rad/s]. It is at rest in the
    !> middle of the cell, grows linearly by the jump from border to border, and turns with half of its gradient,
@@ -272,20 +272,21 @@ contains
       rounded = (number + rounder) - rounder
    end function rounded
 
-   !> Replace the vectors between the bodies of some pairs by those to the nearest copies.
-   pure subroutine fold_offsets(cell, n, first, second, folds, offset)
+   !> Replace the vectors between the bodies of some pairs by their minimum images.
+   pure subroutine find_minimum_images(cell, n, first, second, inverse_period, offset)
       type(cell_t), intent(in) :: cell
       !> Number of pairs, and slots of their bodies
       integer(ip), intent(in) :: n, first(:), second(:)
-      !> 1/size of each body as in `bodies_t`, (2, slot) [1/m]
-      real(wp), intent(in), contiguous :: folds(:, :)
+      !> That of each body, as in `bodies_t`, (2, slot) [1/m]
+      real(wp), intent(in), contiguous :: inverse_period(:, :)
       !> Vectors from the first to the second body, (pair, x or y) [m]
       real(wp), intent(inout) :: offset(:, :)
       integer(ip) :: c
 
       do c = 1_ip, n
-         offset(c, :) = nearest_copy(cell, min(folds(:, first(c)), folds(:, second(c))), offset(c, :))
+         offset(c, :) = minimum_image(cell, min(inverse_period(:, first(c)), inverse_period(:, second(c))), &
+                                      offset(c, :))
       end do
-   end subroutine fold_offsets
+   end subroutine find_minimum_images
 
 end module polydem_cell

@@ -46,7 +46,7 @@ module polydem_provenance
    end type provenance_t
 
    !> Version of the file layout. It increases when a reader of the previous version would fail.
-   integer(ip), parameter :: schema_version = 7_ip
+   integer(ip), parameter :: schema_version = 8_ip
 
 contains
 

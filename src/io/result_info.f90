@@ -156,23 +156,18 @@ contains
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
       real(dp), allocatable :: times(:)
-      integer(lp), allocatable :: shape(:), start(:)
+      integer(lp), allocatable :: start(:)
       character(len=:), allocatable :: bodies
 
-      if (.not. file%has('/frames/time', error)) return
+      if (.not. file%has('/frames/start', error)) return
+      call file%read('/frames/start', start, error)
       call file%read('/frames/time', times, error)
-      call file%shape_of('/frames/position', shape, error)
       if (allocated(error)) return
-      if (size(times) == 0 .or. all(size(shape) /= [2, 3])) return
-      if (size(shape) == 3) bodies = to_text(shape(2))
-      if (size(shape) == 2) then
-         call file%read('/frames/start', start, error)
-         if (allocated(error)) return
-         if (size(start) <= size(times)) return
-         associate (n => start(2:) - start(:size(start) - 1))
-            bodies = to_text(minval(n))//' to '//to_text(maxval(n))
-         end associate
-      end if
+      if (size(times) == 0 .or. size(start) <= size(times)) return
+      associate (n => start(2:) - start(:size(start) - 1))
+         bodies = to_text(minval(n))
+         if (maxval(n) > minval(n)) bodies = bodies//' to '//to_text(maxval(n))
+      end associate
       call log%write_line('   frames          '//to_text(size(times, kind=ip))//' of '//bodies// &
                           ' bodies, from '//to_text(real(times(1), wp))//' s to '// &
                           to_text(real(times(size(times)), wp))//' s')

@@ -3,6 +3,7 @@ module polydem_result_summary
    use polydem_errors, only: error_t, raise_unread
    use polydem_file_system, only: exists, last_failure
    use polydem_folder_lock, only: lock_path
+   use polydem_frame_columns, only: insist_on_layout
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
@@ -63,7 +64,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       character(len=:), allocatable :: text
-      integer(lp), allocatable :: shape(:), start(:)
+      integer(lp), allocatable :: start(:)
       real(dp), allocatable :: times(:)
       integer(ip) :: number
 
@@ -72,20 +73,18 @@ contains
       do while (exists(segment_path(folder, number), error))
          call file%open(segment_path(folder, number), error)
          call file%read('/frames/time', times, error)
-         call file%shape_of('/bodies/id', shape, error)
-         if (allocated(start)) deallocate (start)
-         if (file%has('/frames/start', error)) call file%read('/frames/start', start, error)
+         call insist_on_layout(file, segment_path(folder, number), error)
+         call file%read('/frames/start', start, error)
          if (.not. allocated(error) .and. number == 1_ip) then
             if (file%has('/provenance/resolved_input', error)) call file%read('/provenance/resolved_input', text, error)
             if (allocated(text)) frames%scene = scene_of(text)
          end if
          call file%close(error)
          if (allocated(error)) return
-         if (size(times) > 0 .and. size(shape) == 1) then
+         if (size(times) > 0 .and. size(start) > 1) then
             if (frames%n == 0_lp) frames%first = times(1)
             frames%last = times(size(times))
-            frames%bodies = shape(1)
-            if (allocated(start)) frames%bodies = start(size(start)) - start(size(start) - 1)
+            frames%bodies = start(size(start)) - start(size(start) - 1)
          end if
          frames%n = frames%n + size(times, kind=lp)
          frames%n_segments = frames%n_segments + 1_lp

@@ -156,7 +156,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call run%trajectory%open(run%folder, frames_per_segment(run%simulation), run%provenance, error, &
-                               run%previous%segments, run%comm, allocated(run%simulation%traffic))
+                               run%previous%segments, run%comm, allocated(run%simulation%sources_and_sinks))
       if (run%comm%size == 1_ip .and. .not. allocated(error)) &
          call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
    end subroutine open_output

@@ -136,15 +136,15 @@ contains
       if (.not. run%options%has_files) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
-         if (allocated(s%traffic)) then
-            call s%traffic%departures%drop_rows(run%previous%last_frame)
+         if (allocated(s%sources_and_sinks)) then
+            call s%sources_and_sinks%departures%drop_rows(run%previous%last_frame)
             if (output%contacts) then
                call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, &
-                                               run%manifest, s%series, s%traffic%departures)
+                                               run%manifest, s%series, s%sources_and_sinks%departures)
             else
                call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, &
                                                manifest=run%manifest, series=s%series, &
-                                               departures=s%traffic%departures)
+                                               departures=s%sources_and_sinks%departures)
             end if
             run%last_frame = s%step
             return

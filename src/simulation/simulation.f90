@@ -21,7 +21,7 @@ module polydem_simulation
    use polydem_start_findings, only: expected_impact_t, relaxation_t, static_pressure_t
    use polydem_strings, only: counted
    use polydem_timers, only: timers_t
-   use polydem_traffic, only: traffic_t
+   use polydem_sources_and_sinks, only: sources_and_sinks_t
    use polydem_walls, only: walls_t
    use polydem_warning, only: warning_t
    use polydem_loop_results, only: loop_results_t
@@ -118,7 +118,7 @@ module polydem_simulation
       !> Rows of the series that no file has yet
       type(series_t) :: series
       !> Sources and sinks; not allocated if there are none
-      type(traffic_t), allocatable :: traffic
+      type(sources_and_sinks_t), allocatable :: sources_and_sinks
       !> Actions of the program that holds the simulation, or of a file; not allocated if there are none
       type(actions_t), allocatable :: actions
       !> Boxes of the bodies, and the pairs of those that overlap

@@ -41,10 +41,10 @@ contains
       call collect_counts(self)
       call counters%set('steps', self%step)
       call counters%set('bodies', int(self%bodies%n_all, lp))
-      if (allocated(self%traffic)) then
-         call counters%set('bodies entered', sum(self%traffic%sources%entered), over_steps)
-         call counters%set('bodies departed', sum(self%traffic%sinks%departed), over_steps)
-         call counters%set('entries without room', sum(self%traffic%sources%blocked), over_steps)
+      if (allocated(self%sources_and_sinks)) then
+         call counters%set('bodies entered', sum(self%sources_and_sinks%sources%entered), over_steps)
+         call counters%set('bodies departed', sum(self%sources_and_sinks%sinks%departed), over_steps)
+         call counters%set('entries without room', sum(self%sources_and_sinks%sources%blocked), over_steps)
       end if
       call counters%set('boxes', counts(1))
       call counters%set('pairs began', self%sums(sum_began), over_steps)

@@ -92,8 +92,8 @@ contains
       integer :: k
 
       departures = 0.0_wp
-      do k = 1, size(simulation%traffic%sinks)
-         associate (sink => simulation%traffic%sinks(k))
+      do k = 1, size(simulation%sources_and_sinks%sinks)
+         associate (sink => simulation%sources_and_sinks%sinks(k))
             if (name == '' .or. name == sink%settings%name) departures = departures + real(sink%departed, wp)
          end associate
       end do

@@ -53,11 +53,23 @@ def read_trajectory(folder, names):
         start = part.pop("trajectory/contacts/start", None)
         if start is not None:
             part["trajectory/contacts/per frame"] = np.diff(start)
+        flatten_frames(part)
         parts.append(part)
     if not parts:
         return {}
     return {name: value if STANDING.fullmatch(name) else np.concatenate([part[name] for part in parts])
             for name, value in parts[0].items()}
+
+
+def flatten_frames(part):
+    """One row per body of each frame, also of an older segment with one row per frame."""
+    if part.pop("trajectory/frames/start", None) is not None or "trajectory/frames/angle" not in part:
+        return
+    frame = part["trajectory/frames/angle"].shape[:2]
+    for name, values in part.items():
+        if (name.startswith("trajectory/frames/") and not name.endswith(("/cell_low", "/cell_size"))
+                and values.shape[:2] == frame):
+            part[name] = values.reshape(-1, *values.shape[2:])
 
 
 def read_result(folder, names, whole=True, ranks=1):

@@ -16,15 +16,21 @@ from guard_runs import Side, UnknownError
 MANUAL = guard_python.ROOT / "inputs" / "entries.md"
 
 
-def write_result(folder, start=0, change=None, counters=("steps", "contacts"), ledger="ledger"):
-    """A result of two segments with two frames each; `change` gets the file of the second one."""
+def write_result(folder, start=0, change=None, counters=("steps", "contacts"), ledger="ledger", listed=True):
+    """A result of two segments with two frames each; `change` gets the file of the second one.
+
+    Not `listed`: in the older form, with one row per frame.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for number in (1, 2):
         with h5py.File(folder / f"trajectory_{number:04d}.h5", "w") as file:
             chance = np.random.default_rng(number + start)
             file["bodies/id"] = np.arange(3, dtype=np.int32)
-            file["frames/position"] = chance.random((2, 3, 2))
-            file["frames/angle"] = chance.random((2, 3))
+            file["frames/position"] = chance.random((6, 2) if listed else (2, 3, 2))
+            file["frames/angle"] = chance.random(6 if listed else (2, 3))
+            file["frames/cell_size"] = chance.random((2, 3))
+            if listed:
+                file["frames/start"] = np.array([0, 3, 6])
             file["contacts/start"] = np.array([0, 2, 3])
             file["contacts/force"] = chance.random((3, 2))
             file["walls/force"] = chance.random((2, 1, 2))
@@ -65,10 +71,11 @@ class TestGuard(unittest.TestCase):
 
     def test_the_same_result_is_equal(self):
         self.assertEqual(self.against(), ([], []))
-        self.assertEqual(self.expected["trajectory/frames/position"].shape, (4, 3, 2))
+        self.assertEqual(self.expected["trajectory/frames/position"].shape, (12, 2))
+        self.assertEqual(self.against(listed=False), ([], []))
 
     def test_one_bit_of_any_kind_of_number_is_found(self):
-        for name, place, where in (("frames/position", (1, 2, 0), "[3, 2, 0]"), ("frames/angle", (0, 1), "[2, 1]"),
+        for name, place, where in (("frames/position", (5, 0), "[11, 0]"), ("frames/angle", (1,), "[7]"),
                                    ("contacts/force", (2, 1), "[5, 1]"), ("walls/force", (1, 0, 1), "[3, 0, 1]"),
                                    ("ledger/kinetic", (0,), "[2]")):
             for whole in (True, False):

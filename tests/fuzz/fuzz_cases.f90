@@ -154,7 +154,7 @@ contains
       type(random_t), intent(inout) :: random
       !> Why it was refused
       type(error_t), allocatable, intent(inout) :: error
-      type(field_t) :: fields(11)
+      type(field_t) :: fields(12)
 
       fields = sound_segment()
       call spoil_fields(random, fields)
@@ -302,21 +302,22 @@ contains
 
    !> Two frames of a square and a triangle, and what a profile says
    function sound_segment() result(fields)
-      type(field_t) :: fields(11)
+      type(field_t) :: fields(12)
 
       fields(1) = new_field('bodies/fixed', [2], [0.0_dp, 1.0_dp], .true.)
       fields(2) = new_field('bodies/vertex_start', [3], [0.0_dp, 4.0_dp, 7.0_dp], .true.)
       fields(3) = new_field('bodies/vertex', [2, 7], [-0.5_dp, -0.5_dp, 0.5_dp, -0.5_dp, 0.5_dp, 0.5_dp, &
          -0.5_dp, 0.5_dp, -1.0_dp, -1.0_dp, 2.0_dp, -1.0_dp, -1.0_dp, 2.0_dp], .false.)
-      fields(4) = new_field('frames/position', [2, 2, 2], [0.0_dp, 0.0_dp, 3.0_dp, 3.0_dp, &
+      fields(4) = new_field('frames/position', [2, 4], [0.0_dp, 0.0_dp, 3.0_dp, 3.0_dp, &
          0.1_dp, 0.0_dp, 3.0_dp, 3.0_dp], .false.)
-      fields(5) = new_field('frames/angle', [2, 2], [0.0_dp, 0.0_dp, 0.2_dp, 0.0_dp], .false.)
+      fields(5) = new_field('frames/angle', [4], [0.0_dp, 0.0_dp, 0.2_dp, 0.0_dp], .false.)
       fields(6) = new_field('frames/time', [2], [0.0_dp, 0.5_dp], .false.)
       fields(7) = new_text('state_hash', '0123456789abcdef')
       fields(8) = new_text('status', 'finished')
       fields(9) = new_text('provenance/version', '0.1.0')
       fields(10) = new_text('provenance/revision', 'none')
       fields(11) = new_text('provenance/compiler', repeat('GCC ', 50))
+      fields(12) = new_field('frames/start', [3], [0.0_dp, 2.0_dp, 4.0_dp], .true.)
    end function sound_segment
 
 end module fuzz_cases

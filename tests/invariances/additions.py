@@ -170,7 +170,7 @@ class Additions:
         for name in list(scene.groups):
             if name.startswith(("motion.", "load.", "source.", "sink.")) and self.dice.random() < 0.4:
                 scene.put(name, stage=self.dice.choice(("first", "second")))
-                scene.tags.add("stage_of_motion" if name[0] in "ml" else "stage_of_traffic")
+                scene.tags.add("stage_of_motion" if name[0] in "ml" else "stage_of_source_or_sink")
 
     def rectangle(self):
         """A rectangle smaller than the cell, often across its border."""

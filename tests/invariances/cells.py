@@ -35,7 +35,8 @@ def border(scene, dice):
         if not profile and not body.fixed:
             body.velocity = body.velocity + drift
         if inside and not (body.fixed and body.reach > 0.4*size[scene.periodic[0]]):
-            fold(body, low, size, scene.periodic, 0.0 if profile or "shear_ramp" in scene.tags else rate*size[1])
+            jump = 0.0 if profile or "shear_ramp" in scene.tags else rate*size[1]
+            put_into_cell(body, low, size, scene.periodic, jump)
     for name in scene.named("source"):
         ends = [np.array(scene.get(f"source.{name}", key)) for key in ("low", "high")]
         for axis in scene.periodic:
@@ -65,7 +66,7 @@ def crosses_source(scene, axis, by):
     return any((first - low) % size + (last - first) > size*(1 - 1e-9) for first, last in ends)
 
 
-def fold(body, low, size, axes, jump):
+def put_into_cell(body, low, size, axes, jump):
     """Put a body into the cell, with the velocity of the border."""
     for axis in axes:
         cells = -np.floor((body.centre[axis] - low[axis])/size[axis])

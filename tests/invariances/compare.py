@@ -49,7 +49,7 @@ def jump_of(scene, frame):
     return rate*u*u*(3 - 2*u)*frame.size[1]
 
 
-def folded(scene, frame, place, velocity):
+def minimum_image(scene, frame, place, velocity):
     """Differences of places and velocities up to copies of the cell."""
     place, velocity = place.copy(), velocity.copy()
     if frame.size is None:
@@ -84,7 +84,8 @@ def bound_of(scene, answer, disturbed):
                 worst[:] = np.inf
                 continue
             row, twin = frames[frame.step]
-            place, velocity = folded(scene, frame, twin.position - frame.position, twin.velocity - frame.velocity)
+            place, velocity = minimum_image(scene, frame, twin.position - frame.position,
+                                            twin.velocity - frame.velocity)
             turn, spin = (scene.size*abs(a - b).max(initial=0.0)
                           for a, b in ((twin.angle, frame.angle), (twin.spin, frame.spin)))
             energy = max(abs(other.balance[key][row] - answer.balance[key][k]) for key in ENERGIES)/scale
@@ -202,9 +203,9 @@ def deviations(scene, case, frame, twin, one, two):
     back = np.linalg.inv(change.matrix)/change.length
     place = (twin.position[two] - case.drift*time - change.shift) @ back.T - frame.position[one]
     velocity = ((twin.velocity[two] - case.drift) @ back.T)*change.time - frame.velocity[one]
-    place, velocity = folded(scene, frame, place, velocity)
+    place, velocity = minimum_image(scene, frame, place, velocity)
     if case.relative and len(one):
-        place, velocity = folded(scene, frame, place - place[0], velocity - velocity[0])
+        place, velocity = minimum_image(scene, frame, place - place[0], velocity - velocity[0])
     return place*change.length, velocity*change.length/change.time
 
 

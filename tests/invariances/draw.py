@@ -277,7 +277,7 @@ class Drawing(Additions):
                 scene.tags.add("stages")
                 self.add_stages()
             scene.put("sink.bin", stage="second")
-            scene.tags.add("stage_of_traffic")
+            scene.tags.add("stage_of_source_or_sink")
         if {"start_checkpoint", "start_frame"} & self.chosen:
             scene.start = "checkpoint" if "start_checkpoint" in self.chosen else "frame"
             scene.prelude = self.dice.randint(3, 6)*20

@@ -196,9 +196,9 @@ def read_frames(file, answer):
     group, cell = file["frames"], file.get("cell")
     step, time = group["step"][()], group["time"][()]
     data = {key: group[key][()] for key in ("position", "angle", "velocity", "angular_velocity")}
-    ragged = "start" in group
-    identifiers = group["id"][()] if ragged else file["bodies/id"][()]
-    starts = group["start"][()] if ragged else None
+    starts = group["start"][()]
+    # Without identifiers, all frames have the same bodies.
+    identifiers = group["id"][()] if "id" in group else np.tile(file["bodies/id"][()], len(step))
     contacts = file.get("contacts")
     if contacts is not None:
         where = contacts["start"][()]
@@ -209,8 +209,8 @@ def read_frames(file, answer):
     for k in range(len(step)):
         if int(step[k]) in known:
             continue
-        rows = slice(starts[k], starts[k + 1]) if ragged else k
-        names = identifiers[rows] if ragged else identifiers
+        rows = slice(starts[k], starts[k + 1])
+        names = identifiers[rows]
         # Walls that have vanished are no bodies of the frame.
         there = ~np.isin(names, file["walls/id"][()][present[k] == 0]) if present is not None else slice(None)
         frame = Frame(int(step[k]), float(time[k]), names[there],

@@ -34,12 +34,12 @@ program write_together
    integer(lp), parameter :: n_frames = 3_lp
    integer(ip), parameter :: per_segment = 2_ip
    !> Data sets that are compared
-   character(len=*), parameter :: in_segments(25) = [character(len=24) :: '/bodies/id', '/bodies/fixed', &
+   character(len=*), parameter :: in_segments(26) = [character(len=24) :: '/bodies/id', '/bodies/fixed', &
       '/bodies/mass', '/bodies/inertia', '/bodies/vertex_start', '/bodies/vertex', '/walls/id', '/walls/force', &
-      '/walls/torque', '/frames/step', '/frames/time', '/frames/position', '/frames/angle', '/frames/velocity', &
-      '/frames/angular_velocity', '/contacts/start', '/contacts/first', '/contacts/second', '/contacts/area', &
-      '/contacts/point', '/contacts/normal', '/contacts/length', '/contacts/force', '/contacts/couple', &
-      '/energy_balance/kinetic']
+      '/walls/torque', '/frames/start', '/frames/step', '/frames/time', '/frames/position', '/frames/angle', &
+      '/frames/velocity', '/frames/angular_velocity', '/contacts/start', '/contacts/first', '/contacts/second', &
+      '/contacts/area', '/contacts/point', '/contacts/normal', '/contacts/length', '/contacts/force', &
+      '/contacts/couple', '/energy_balance/kinetic']
    character(len=*), parameter :: in_checkpoint(9) = [character(len=24) :: '/run/sums', '/bodies/id', &
       '/bodies/position', '/bodies/angle', '/bodies/force', '/vertices/position', '/pairs/first', '/pairs/second', &
       '/pairs/tangential']

@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import h5py
+from polydem_post.read.segments import ROWS_OF_FRAMES
 
 PAGE = Path(__file__).resolve().parents[2] / "postproc" / "file_formats.md"
 
@@ -76,8 +77,12 @@ def _shape(name, item, lengths):
         return "scalar"
     first = "p" if name.startswith("pairs/") else lengths.get(item.shape[0], item.shape[0])
     if item.maxshape[0] is None:
-        first = {"contacts/start": "frames + 1", "contacts": "contacts", "steps": "steps"}.get(
-            name if name == "contacts/start" else name.partition("/")[0], "steps" if "/" not in name else "frames")
+        group, _, column = name.partition("/")
+        first = {"contacts": "contacts", "steps": "steps", name: "steps"}.get(group, "frames")
+        if column == "start":
+            first = "frames + 1"
+        elif group == "frames" and column not in ROWS_OF_FRAMES:
+            first = "rows"
     return "(" + ", ".join(str(word) for word in (first, *(lengths.get(k, k) for k in item.shape[1:]))) + ")"
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from polydem_post.base.result_file import SCHEMA_VERSION
 from test_manifest import closed_row, write_manifest
 
 #: Bodies, contacts and frames of a segment, and segments; POLYDEM_SEGMENTS=220 makes the 1 GB of the manual
@@ -34,7 +35,7 @@ def write_segment(path, number):
     random = np.random.default_rng(number)
     corners = 4
     with h5py.File(path, "w") as file:
-        file.attrs["schema_version"] = 4
+        file.attrs["schema_version"] = SCHEMA_VERSION
         file["bodies/id"] = np.arange(1, BODIES + 1)
         file["bodies/fixed"] = np.zeros(BODIES, dtype=np.int8)
         file["bodies/mass"] = file["bodies/inertia"] = np.ones(BODIES)
@@ -42,13 +43,15 @@ def write_segment(path, number):
         file["bodies/vertex"] = np.tile([(-1.0, -1), (1, -1), (1, 1), (-1, 1)], (BODIES, 1))
         file["frames/step"] = number * FRAMES + np.arange(FRAMES)
         file["frames/time"] = (number * FRAMES + np.arange(FRAMES)) * 0.1
+        file["frames/start"] = BODIES * np.arange(FRAMES + 1)
         for name, shape in (("position", (2,)), ("angle", ()), ("velocity", (2,)), ("angular_velocity", ())):
-            file[f"frames/{name}"] = random.random((FRAMES, BODIES, *shape))
+            file[f"frames/{name}"] = random.random((FRAMES * BODIES, *shape))
         rows = FRAMES * CONTACTS
         file["contacts/start"] = CONTACTS * np.arange(FRAMES + 1)
         file["contacts/first"] = np.ones(rows, dtype=np.int32)
         file["contacts/second"] = random.integers(2, BODIES, rows).astype(np.int32)
-        file["contacts/area"] = random.random(rows)
+        for name in ("area", "length", "couple"):
+            file[f"contacts/{name}"] = random.random(rows)
         for name in ("point", "normal", "force"):
             file[f"contacts/{name}"] = random.random((rows, 2))
 

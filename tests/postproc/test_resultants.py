@@ -125,19 +125,3 @@ def test_stress_of_grains_at_rest_is_symmetric(tmp_path):
     assert frame.speed.max() < 1e-4
     stress = sample_stress(frame, (-0.05, 0.0, 0.05, 0.2))
     assert abs(stress[0, 1] - stress[1, 0]) < 1e-3 * stress[1, 1]
-
-
-def test_contacts_of_an_older_layout_are_read(tmp_path):
-    run = run_of(SCENES["tilts damped"], tmp_path)
-    new = run[-1].contacts
-    with h5py.File(next((tmp_path / "result").glob("trajectory_0001.h5")), "a") as file:
-        group = file["contacts"]
-        gradient = group["length"][:][:, None] * group["normal"][:]
-        del group["normal"], group["length"], group["couple"]
-        group["normal"] = gradient
-        file.attrs["schema_version"] = 6
-    old = Trajectory(tmp_path / "result", check=False)[-1].contacts
-    assert_allclose(old.normal, new.normal, rtol=1e-12)
-    assert_allclose(old.length, new.length, rtol=1e-12)
-    assert_allclose(old.area_gradient, new.area_gradient, rtol=1e-12)
-    assert np.isnan(old.couple).all() and (old.force == new.force).all()

@@ -1,10 +1,13 @@
 """Reading finished results. What is in them is said in tests/io/sample.f90."""
 
+import shutil
+
 import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import ResultError, Trajectory
+from test_manifest import rows_of, write_manifest
 
 
 def test_joins_the_segments(finished):
@@ -134,12 +137,24 @@ def test_names_what_is_missing(tmp_path, finished):
         Trajectory(tmp_path / "other.h5")
 
 
+@pytest.mark.parametrize("listed", [True, False])
+def test_refuses_a_segment_of_an_earlier_layout(tmp_path, finished, listed):
+    folder = tmp_path / "result"
+    shutil.copytree(finished, folder)
+    with h5py.File(folder / "trajectory_0002.h5", "r+") as file:
+        file.attrs["schema_version"] = 7
+    if listed:
+        write_manifest(folder, rows_of(folder))
+    with pytest.raises(ResultError, match="trajectory_0002.h5: has file layout 7 .* run its scene again"):
+        Trajectory(folder)
+
+
 def test_names_what_a_run_did_not_write(tmp_path, finished):
     with h5py.File(finished / "trajectory_0001.h5", "r") as source:
         with h5py.File(tmp_path / "trajectory_0001.h5", "w") as file:
             for name in ("bodies", "frames", "provenance"):
                 source.copy(name, file)
-            file.attrs["schema_version"] = 1
+            file.attrs["schema_version"] = source.attrs["schema_version"]
     run = Trajectory(tmp_path)
     assert len(run) == 3
     assert run.energy_balance == {}

@@ -96,7 +96,7 @@ CAPABILITIES = {
                " friction_scale = 0 /\n"
                "&stage name = 'rough' duration = 0.011 gravity = 20, -20 /\n"),
     "pieces": Capability(upper="shape = 'cross' width = 0.009 arm = 0.003"),
-    "traffic": Capability(
+    "sources_and_sinks": Capability(
         groups="&source name = 'feed' low = -0.045, 0.01 high = 0.045, 0.045 count = 50 interval = 20"
                " velocity = 0, -1 /\n"
                "&sink name = 'bin' low = -0.05, -0.05 high = 0.05, -0.035 interval = 20 /\n"),
@@ -108,7 +108,7 @@ CAPABILITIES = {
 REFUSED = {
     ("exact_friction", "shear"): "does not know the velocity of the border",
     ("exact_friction", "controlled"): "does not know how the cell grows",
-    ("traffic", "controlled"): "do not move with the cell",
+    ("sources_and_sinks", "controlled"): "do not move with the cell",
     ("exact_friction", "local_damping"): "whose forces depend on the motion without it",
     ("exact_friction", "gear"): "velocity_verlet",
     ("compensated", "gear"): "accumulation",

@@ -149,7 +149,7 @@ def a_frame_is_a_start_without_history(case):
 
 
 def a_stress_controlled_cell_keeps_its_size(case):
-    """Finds a start with bodies that a cell of another size folds back over each other."""
+    """Finds a start with bodies that a cell of another size brings back over each other."""
     cell = "&cell periodic = 'xy' size = {size} {entries} /\n"
     rest = "&forces gravity = 0, 0 stiffness = 2e5 /\n" + OUTPUT.format(duration="duration = 0.015625", scheme="")
     entries = "stress_controlled = 'xy' stress = 2e4, 1e4 mass = 0.02"
@@ -216,9 +216,9 @@ def last_poses(folder):
     """Identifier -> pose and velocity of each free body of the last frame."""
     with h5py.File(max(Path(folder).glob("trajectory_*.h5"))) as file:
         frames, fixed = file["frames"], set(file["bodies/id"][()][file["bodies/fixed"][()] == 1])
-        # A run with sources has all frames in one list.
-        rows = slice(*frames["start"][-2:]) if "start" in frames else -1
-        names = frames["id"][rows] if "start" in frames else file["bodies/id"][()]
+        rows = slice(*frames["start"][-2:])
+        # Only a run with sources says which bodies a frame has.
+        names = frames["id"][rows] if "id" in frames else file["bodies/id"][()]
         columns = [frames[name][rows] for name in ("position", "angle", "velocity", "angular_velocity")]
         return {int(name): [column[k].tobytes() for column in columns]
                 for k, name in enumerate(names) if name not in fixed}
@@ -306,10 +306,13 @@ def last_bodies(folder, frame):
     """Positions, velocities and paths in a frame of a result of one or more segments."""
     files = sorted(name for name in os.listdir(folder) if re.fullmatch(r"trajectory_\d+\.h5", name))
     with h5py.File(os.path.join(folder, files[0 if frame >= 0 else -1])) as file:
-        found = {name: file["frames"][name][frame] for name in ("position", "velocity")}
-        path = found["position"] + file["frames/image"][frame] * file["cell/size"][:]
+        start = file["frames/start"][()]
+        frame %= len(start) - 1
+        rows = slice(start[frame], start[frame + 1])
+        found = {name: file["frames"][name][rows] for name in ("position", "velocity")}
+        path = found["position"] + file["frames/image"][rows] * file["cell/size"][:]
         if "shear_offset" in file["frames"]:
-            path[:, 0] += file["frames/shear_offset"][frame]
+            path[:, 0] += file["frames/shear_offset"][rows]
     return {**found, "path": path}
 
 

@@ -29,7 +29,7 @@ GRAINS = """\
 """
 #: The longest names that there may be
 FEED, DRAIN, FLOOR = (word.ljust(64, "_") for word in ("feed", "drain", "floor"))
-TRAFFIC = f"""\
+SOURCE_AND_SINK = f"""\
 &source name = '{FEED}' low = -0.05, 0.05 high = 0.05, 0.1 rate = 4e5 interval = 9
    short_axis = 4e-3 long_axis = 4e-3, 4e-3 /
 &sink name = '{DRAIN}' low = -0.2, -0.1 high = 0.2, 0.012 interval = 6 /
@@ -47,7 +47,7 @@ DURATION = STEPS.format("duration = 2.3e-4")
 #: Scenes by how the run ends, with the exit code
 ENDS = {
     "duration": (GRAINS + DURATION, DONE),
-    "traffic": (GRAINS.replace("floor", FLOOR) + TRAFFIC + DURATION, DONE),
+    "sources_and_sinks": (GRAINS.replace("floor", FLOOR) + SOURCE_AND_SINK + DURATION, DONE),
     "condition": (GRAINS + LID + STEPS.format("") + "&stage name = 'fall' duration = 8e-5 /\n"
                   "&stage name = 'rest' until = 'kinetic' above = 1e-9 check = 7 hold = 9e-5 longest = 1e-3 /\n",
                   DONE),
@@ -127,7 +127,7 @@ def run(end, tmp_path, monkeypatch):
     code = ENDS[end][1]
     found, _, message = start("whole")
     assert found == code, message
-    return code, message, (*contents("whole"), end == "traffic")
+    return code, message, (*contents("whole"), end == "sources_and_sinks")
 
 
 @pytest.fixture(scope="module")

@@ -181,7 +181,7 @@ def test_what_info_tells_must_be_in_the_file():
     assert call("run", "scene.nml")[0] == 0
     told = 0
     for file_name, names in (("profile.h5", ("/state_hash", "/status", "/provenance/host", "/provenance/version")),
-                             ("trajectory_0001.h5", ("/frames/time", "/frames/position", "/provenance/version"))):
+                             ("trajectory_0001.h5", ("/frames/time", "/frames/start", "/provenance/version"))):
         for name in names:
             for way in (*OUTSIDE, *INSIDE):
                 shutil.rmtree("copy", ignore_errors=True)

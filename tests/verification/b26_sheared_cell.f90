@@ -8,7 +8,7 @@ module b26_sheared_cell
    use trial, only: begin, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
-   use polydem_cell, only: nearest_copy
+   use polydem_cell, only: minimum_image
    use polydem_contacts, only: contact_force
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
@@ -216,7 +216,7 @@ contains
                (bodies%velocity(1, s) - rate*(bodies%position(2, s) - 0.5_wp*side))
          end do
          do c = 1_ip, cell%contacts%n
-            branch = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, cell%contacts%row(c)%second) &
+            branch = minimum_image(bodies%cell, bodies%cell%inverse, bodies%position(:, cell%contacts%row(c)%second) &
                                   - bodies%position(:, cell%contacts%row(c)%first))
             force = contact_force(cell%contacts, c)
             sum_xy = sum_xy + branch(2)*force(1)

@@ -57,7 +57,7 @@ contains
                  groups, list, entering, error)
       call table%note_error(error)
       if (allocated(error)) return
-      source = entering%traffic%sources(1)
+      source = entering%sources_and_sinks%sources(1)
       call source%draw_candidates(1_lp, candidates)
       call alone%append(square(-50.0_wp), fixed=.true.)
       associate (first => candidates(1))
@@ -75,7 +75,8 @@ contains
          maxval(abs(entering%bodies%position(:, one) - starting%bodies%position(:, other))), 0.0_wp)
       call table%expect_absolute('flight with '//name//': difference of the velocities [m/s]', 0.0_wp, &
          maxval(abs(entering%bodies%velocity(:, one) - starting%bodies%velocity(:, other))), 0.0_wp)
-      call table%expect_true('one body has entered', entering%traffic%sources(1)%entered == 1_lp .and. one == 3_ip)
+      call table%expect_true('one body has entered', entering%sources_and_sinks%sources(1)%entered == 1_lp &
+                             .and. one == 3_ip)
    end subroutine enter
 
    !> A square of 2 m
@@ -127,10 +128,10 @@ contains
          no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) call steps(simulation, 15000, error)
-      if (.not. allocated(error)) mark(0) = simulation%traffic%sinks(1)%departed
+      if (.not. allocated(error)) mark(0) = simulation%sources_and_sinks%sinks(1)%departed
       do k = 1, 4
          if (.not. allocated(error)) call steps(simulation, part, error)
-         if (.not. allocated(error)) mark(k) = simulation%traffic%sinks(1)%departed
+         if (.not. allocated(error)) mark(k) = simulation%sources_and_sinks%sinks(1)%departed
       end do
       call table%note_error(error)
       if (allocated(error)) return
@@ -138,7 +139,7 @@ contains
       call table%show(name//'grains per second', rate)
       call table%expect_relative(name//'rate in the second half over that in the first', 1.0_wp, &
                                  real(mark(4) - mark(2), wp)/real(mark(2) - mark(0), wp), 0.1_wp)
-      associate (source => simulation%traffic%sources(1), sink => simulation%traffic%sinks(1), &
+      associate (source => simulation%sources_and_sinks%sources(1), sink => simulation%sources_and_sinks%sinks(1), &
                  bodies => simulation%bodies)
          call table%expect_true(name//'number in = number out + number there', &
                                 source%entered == sink%departed + size(bodies%free, kind=lp))

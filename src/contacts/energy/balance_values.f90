@@ -28,7 +28,7 @@ contains
          call row%set('load_damping_work', balance%load_damping_work, 'J/m', 'work of the damping of these walls')
          call row%set('wall_kinetic', balance%wall_kinetic, 'J/m', 'kinetic energy of these walls')
       end if
-      if (balance%has_traffic) then
+      if (balance%bodies_change) then
          call row%set('entered_energy', balance%exchanged(1), 'J/m', 'energy that bodies brought when they entered')
          call row%set('departed_energy', balance%exchanged(2), 'J/m', 'energy that bodies took when they left')
       end if

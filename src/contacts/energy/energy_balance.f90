@@ -92,7 +92,7 @@ module polydem_energy_balance
       !> Work of the loads and of the damping of their walls, and their kinetic energy [J/m]
       real(wp) :: load_work = 0.0_wp, load_damping_work = 0.0_wp, wall_kinetic = 0.0_wp
       !> Whether bodies enter or leave
-      logical :: has_traffic = .false.
+      logical :: bodies_change = .false.
       !> Energy that bodies brought when they entered, and that others took when they left [J/m]
       real(wp) :: exchanged(2) = 0.0_wp
       !> Impulse of gravity and fixed bodies, (2) [N s/m]
@@ -251,7 +251,7 @@ contains
       balance%momentum = total(3:4)
       balance%angular_momentum = total(5)
       if (allocated(sums%departed)) then
-         balance%has_traffic = .true.
+         balance%bodies_change = .true.
          balance%exchanged = sums%exchanged
          total(at_torque:at_torque + 1) = total(at_torque:at_torque + 1) + sums%departed(at_torque:at_torque + 1)
          total(at_channels + 1:) = total(at_channels + 1:) + sums%departed(at_channels + 1:)
@@ -266,7 +266,7 @@ contains
          balance%friction_work = works(3)
          balance%wall_work = on_walls(1)
          balance%impulse = on_walls(2:3) + mass_time*gravity
-         if (balance%has_traffic) balance%impulse = balance%impulse + sums%carried(1:2)
+         if (balance%bodies_change) balance%impulse = balance%impulse + sums%carried(1:2)
          balance%angular_impulse = on_walls(4) + torques(1)
          call find_residuals(sums, on_walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))) + sums%carried(3), &
                              on_walls(6) + torques(2), balance)

@@ -1,7 +1,7 @@
 !> Polygons of pairs and the vectors between their centres, as a batch for the search for overlaps.
 module polydem_describe_pairs
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: fold_offsets, nearest_copy
+   use polydem_cell, only: find_minimum_images, minimum_image
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: overlap_batch_t
@@ -29,7 +29,8 @@ contains
 
       if (bodies%pieces%most == 1_ip) then
          call describe_polygons(n, pair, first, second, radius, start, bodies%position, i, j, batch)
-         if (bodies%cell%is_periodic) call fold_offsets(bodies%cell, n, i, j, bodies%folds, batch%offset)
+         if (bodies%cell%is_periodic) call find_minimum_images(bodies%cell, n, i, j, bodies%inverse_period, &
+                                                               batch%offset)
       else
          call describe_polygons(n, pair, first, second, radius, start, bodies%pieces%arm, i, j, batch)
          call add_positions(bodies, n, i, j, batch)
@@ -102,7 +103,7 @@ contains
       offset(1) = bodies%position(1, j) - bodies%position(1, i)
       offset(2) = bodies%position(2, j) - bodies%position(2, i)
       if (bodies%cell%is_periodic) &
-         offset = nearest_copy(bodies%cell, min(bodies%folds(:, i), bodies%folds(:, j)), offset)
+         offset = minimum_image(bodies%cell, min(bodies%inverse_period(:, i), bodies%inverse_period(:, j)), offset)
    end function offset_of
 
    !> Centre of the second polygon of a contact minus centre of the first [m]

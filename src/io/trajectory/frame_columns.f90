@@ -1,5 +1,4 @@
-!> The columns of one frame of a segment, in either form of a segment: with one row per frame or, if bodies enter or
-!> leave, with one row per body of each frame.
+!> The columns of one frame of a segment.
 module polydem_frame_columns
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
@@ -7,7 +6,7 @@ module polydem_frame_columns
    use polydem_sort, only: place_in
    implicit none
    private
-   public :: frame_columns_t, read_frame
+   public :: frame_columns_t, insist_on_layout, read_frame
 
    !> Poses and velocities of the bodies of a frame
    type :: frame_columns_t
@@ -25,6 +24,19 @@ module polydem_frame_columns
 
 contains
 
+   !> Refuse a segment of an earlier version, which had no /frames/start.
+   subroutine insist_on_layout(file, path, error)
+      !> An open segment
+      type(hdf5_file_t), intent(in) :: file
+      !> Its path
+      character(len=*), intent(in) :: path
+      !> Allocated if it is one
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (.not. file%has('/frames/start', error)) call raise(error, input_error, path// &
+         ': is a segment of an earlier file layout. Run its scene again with this version of polydem')
+   end subroutine insist_on_layout
+
    !> Read a frame.
    subroutine read_frame(file, row, id, columns, error)
       !> An open segment
@@ -36,55 +48,8 @@ contains
       type(frame_columns_t), intent(out) :: columns
       !> Allocated if the data sets do not fit together
       type(error_t), allocatable, intent(inout) :: error
-      logical :: is_ragged, fits
-
-      is_ragged = file%has('/frames/start', error)
-      if (allocated(error)) return
-      if (is_ragged) then
-         call read_ragged(file, row, id, columns, error)
-      else
-         call read_rectangular(file, row, id, columns, error)
-      end if
-      if (allocated(error)) return
-      associate (n => size(columns%body))
-         fits = size(columns%position, 1) == 2 .and. size(columns%velocity, 1) == 2 .and. &
-                all([size(columns%position, 2), size(columns%angle), size(columns%velocity, 2), &
-                     size(columns%spin)] == n)
-      end associate
-      if (.not. fits) call raise(error, input_error, 'its frames and bodies have different numbers of bodies')
-   end subroutine read_frame
-
-   !> Read a frame of a segment with one row per frame.
-   subroutine read_rectangular(file, row, id, columns, error)
-      type(hdf5_file_t), intent(in) :: file
-      integer(lp), intent(in) :: row
-      integer(ip), intent(in) :: id(:)
-      type(frame_columns_t), intent(inout) :: columns
-      type(error_t), allocatable, intent(inout) :: error
-      real(dp), allocatable :: vectors(:, :, :), numbers(:, :)
-      integer(ip) :: k
-
-      columns%body = [(k, k=1_ip, size(id, kind=ip))]
-      call file%read('/frames/position', vectors, error, rows=[row, 1_lp])
-      if (.not. allocated(error)) columns%position = vectors(:, :, 1)
-      call file%read('/frames/angle', numbers, error, rows=[row, 1_lp])
-      if (.not. allocated(error)) columns%angle = numbers(:, 1)
-      call file%read('/frames/velocity', vectors, error, rows=[row, 1_lp])
-      if (.not. allocated(error)) columns%velocity = vectors(:, :, 1)
-      call file%read('/frames/angular_velocity', numbers, error, rows=[row, 1_lp])
-      if (.not. allocated(error)) columns%spin = numbers(:, 1)
-   end subroutine read_rectangular
-
-   !> Read a frame of a segment with one row per body of each frame.
-   subroutine read_ragged(file, row, id, columns, error)
-      type(hdf5_file_t), intent(in) :: file
-      integer(lp), intent(in) :: row
-      integer(ip), intent(in) :: id(:)
-      type(frame_columns_t), intent(inout) :: columns
-      type(error_t), allocatable, intent(inout) :: error
-      integer(lp), allocatable :: start(:), present_ids(:)
+      integer(lp), allocatable :: start(:)
       integer(lp) :: rows(2)
-      integer(ip) :: k
 
       call file%read('/frames/start', start, error, rows=[row, 2_lp])
       if (allocated(error)) return
@@ -93,20 +58,46 @@ contains
          call raise(error, input_error, 'its /frames/start does not ascend')
          return
       end if
-      call file%read('/frames/id', present_ids, error, rows=rows)
       call file%read('/frames/position', columns%position, error, rows=rows)
       call file%read('/frames/angle', columns%angle, error, rows=rows)
       call file%read('/frames/velocity', columns%velocity, error, rows=rows)
       call file%read('/frames/angular_velocity', columns%spin, error, rows=rows)
+      call find_bodies(file, rows, id, columns%body, error)
       if (allocated(error)) return
-      allocate (columns%body(size(present_ids)))
+      associate (n => size(columns%body))
+         if (size(columns%position, 1) == 2 .and. size(columns%velocity, 1) == 2 .and. &
+             all([size(columns%position, 2), size(columns%angle), size(columns%velocity, 2), &
+                  size(columns%spin)] == n)) return
+      end associate
+      call raise(error, input_error, 'its frames and bodies have different numbers of bodies')
+   end subroutine read_frame
+
+   !> Find which bodies a frame has: all, unless bodies enter or leave.
+   subroutine find_bodies(file, rows, id, body, error)
+      type(hdf5_file_t), intent(in) :: file
+      !> Number of rows before those of the frame, and number of these
+      integer(lp), intent(in) :: rows(2)
+      integer(ip), intent(in) :: id(:)
+      !> Row of each body in /bodies, from 1
+      integer(ip), allocatable, intent(out) :: body(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: present_ids(:)
+      integer(ip) :: k
+
+      if (.not. file%has('/frames/id', error)) then
+         body = [(k, k=1_ip, size(id, kind=ip))]
+         return
+      end if
+      call file%read('/frames/id', present_ids, error, rows=rows)
+      if (allocated(error)) return
+      allocate (body(size(present_ids)))
       do k = 1_ip, size(present_ids, kind=ip)
-         columns%body(k) = min(place_in(id, int(present_ids(k), ip)), size(id, kind=ip))
-         if (columns%body(k) < 1_ip) exit
-         if (int(id(columns%body(k)), lp) /= present_ids(k)) exit
+         body(k) = min(place_in(id, int(present_ids(k), ip)), size(id, kind=ip))
+         if (body(k) < 1_ip) exit
+         if (int(id(body(k)), lp) /= present_ids(k)) exit
       end do
       if (k <= size(present_ids)) call raise(error, input_error, &
          '/frames/id names a body that /bodies/id does not have')
-   end subroutine read_ragged
+   end subroutine find_bodies
 
 end module polydem_frame_columns

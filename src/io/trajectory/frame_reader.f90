@@ -4,7 +4,7 @@ module polydem_frame_reader
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
-   use polydem_frame_columns, only: frame_columns_t, read_frame
+   use polydem_frame_columns, only: frame_columns_t, insist_on_layout, read_frame
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_result_files, only: segment_path
@@ -136,6 +136,7 @@ contains
              .or. .not. fit(start, shape, piece, size(id))) call raise(error, input_error, path// &
             ': the data sets of its segment of a trajectory are inconsistent')
       end if
+      call insist_on_layout(file, path, error)
       if (.not. allocated(error)) call read_frame(file, row, id, frame, error)
       if (.not. allocated(error)) call find_removed(file, row, fixed == 1_ip, is_removed, error)
       call file%close(error)

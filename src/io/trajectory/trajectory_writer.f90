@@ -18,12 +18,11 @@ module polydem_trajectory_writer
    use polydem_manifest, only: manifest_t
    use polydem_named_values, only: named_values_t
    use polydem_provenance, only: provenance_t, write_provenance
-   use polydem_ragged_segment, only: add_ragged_frame, append_bodies, ragged_rows_t
    use polydem_result_files, only: open_suffix, segment_path
+   use polydem_segment_bodies, only: segment_bodies_t
    use polydem_series, only: series_t
    use polydem_time_limit, only: time_limit_t
-   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_series, add_walls, write_bodies, &
-      write_surroundings
+   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_series, add_walls, write_surroundings
    implicit none
    private
    public :: trajectory_writer_t
@@ -49,10 +48,10 @@ module polydem_trajectory_writer
       integer(ip) :: n_frames = 0_ip
       !> Steps of the first and the last frame in the open segment
       integer(lp) :: steps(2) = 0_lp
-      !> Whether bodies enter or leave
-      logical :: is_ragged = .false.
-      !> What the open segment then has of bodies and frames
-      type(ragged_rows_t) :: rows
+      !> Bodies of the open segment, and whether bodies enter or leave
+      type(segment_bodies_t) :: bodies
+      !> Number of bodies in all its frames together
+      integer(lp) :: n_rows = 0_lp
       !> Number of contacts in the open segment
       integer(lp) :: n_contacts = 0_lp
    contains
@@ -66,7 +65,7 @@ contains
 
    !> Prepare for writing. The folder is created if necessary. It must not contain a result other than the segments of
    !> previous starts of the same run.
-   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number, comm, is_ragged)
+   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number, comm, bodies_change)
       class(trajectory_writer_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -79,9 +78,9 @@ contains
       !> Communicator of the run; absent: this rank writes alone
       class(communicator_t), intent(in), optional :: comm
       !> Whether bodies enter or leave; default: no
-      logical, intent(in), optional :: is_ragged
+      logical, intent(in), optional :: bodies_change
 
-      if (present(is_ragged)) self%is_ragged = is_ragged
+      if (present(bodies_change)) self%bodies%change = bodies_change
       call choose_communicator(self%comm, comm)
       self%folder = folder
       self%capacity = max(1_ip, frames_per_segment)
@@ -128,8 +127,8 @@ contains
       else
          call open_segment(self, bodies, room, error, manifest)
       end if
-      if (.not. allocated(error) .and. present(series)) call write_series(self, bodies, series, error)
-      if (.not. allocated(error) .and. present(departures)) call write_series(self, bodies, departures, error)
+      if (.not. allocated(error) .and. present(series)) call write_series(self, '/series', series, error)
+      if (.not. allocated(error) .and. present(departures)) call write_series(self, '/departures', departures, error)
       if (.not. allocated(error)) call fill_frame(self, step, time, bodies, error, contacts, row)
       if (allocated(error)) then
          call self%file%abandon(error)
@@ -155,12 +154,11 @@ contains
       type(contacts_t), intent(in), optional :: contacts
       type(named_values_t), intent(in), optional :: row
 
-      if (self%is_ragged) then
-         call append_bodies(self%file, self%comm, bodies, self%rows, error)
-         call add_ragged_frame(self%file, self%comm, step, real(time, dp), bodies, self%rows, error)
-      else
-         call add_frame(self%file, self%comm, step, real(time, dp), bodies, error)
-      end if
+      call expect_some(self, bodies)
+      if (self%bodies%change .or. self%n_frames == 0_ip) call self%bodies%append(self%file, self%comm, bodies, error)
+      if (.not. self%bodies%change) call expect_frames(self, bodies)
+      call add_frame(self%file, self%comm, self%n_rows, step, real(time, dp), bodies, self%bodies%change, error)
+      call expect_some(self, bodies)
       call add_walls(self%file, bodies, error)
       if (present(contacts)) call add_contacts(self%file, self%comm, self%n_contacts, bodies, contacts, error)
       if (present(row)) call add_balance(self%file, row, error)
@@ -190,7 +188,7 @@ contains
       call limit%lift()
    end subroutine close_trajectory
 
-   !> Create the next segment and write the bodies to it.
+   !> Create the next segment.
    subroutine open_segment(self, bodies, room, error, manifest)
       type(trajectory_writer_t), intent(inout) :: self
       type(bodies_t), intent(in) :: bodies
@@ -212,34 +210,40 @@ contains
       call open_on_all_ranks(self%comm, self%file, path, room, error)
       if (allocated(error)) return
       self%is_open = .true.
-      call expect_contacts(self, bodies)
-      self%rows = ragged_rows_t()
-      if (self%is_ragged) then
-         call write_surroundings(self%file, bodies, error)
-      else
-         call write_bodies(self%file, self%comm, bodies, error)
-      end if
+      self%bodies = segment_bodies_t(change=self%bodies%change)
+      self%n_rows = 0_lp
+      call write_surroundings(self%file, bodies, error)
    end subroutine open_segment
 
+   !> Expect as many rows of all frames together as all frames have bodies. Chunks hold whole frames, so that reading a
+   !> frame reads no other.
+   subroutine expect_frames(self, bodies)
+      type(trajectory_writer_t), intent(inout) :: self
+      type(bodies_t), intent(in) :: bodies
+
+      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp), &
+                                 int(bodies%n_all, lp))
+   end subroutine expect_frames
+
    !> Choose the size of chunks such that it is small enough for the contacts of loose grains, and large enough for
-   !> those of dense packings.
-   subroutine expect_contacts(self, bodies)
+   !> those of dense packings; likewise for few bodies that enter, and for many.
+   subroutine expect_some(self, bodies)
       type(trajectory_writer_t), intent(inout) :: self
       type(bodies_t), intent(in) :: bodies
 
       call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp)/8_lp)
-   end subroutine expect_contacts
+   end subroutine expect_some
 
    !> Write the rows of a series, in chunks of the size that the segment will probably need.
-   subroutine write_series(self, bodies, series, error)
+   subroutine write_series(self, group, series, error)
       type(trajectory_writer_t), intent(inout) :: self
-      type(bodies_t), intent(in) :: bodies
+      !> Name of its group
+      character(len=*), intent(in) :: group
       type(series_t), intent(in) :: series
       type(error_t), allocatable, intent(inout) :: error
 
       call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(series%n, lp))
-      call add_series(self%file, series, error)
-      call expect_contacts(self, bodies)
+      call add_series(self%file, group, series, error)
    end subroutine write_series
 
    !> Upper bound of the disk space of one frame, including the shapes written before the first frame [B]. A body has

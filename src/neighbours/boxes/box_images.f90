@@ -126,10 +126,10 @@ contains
    end subroutine place_images
 
    !> Replace the bounds of the boxes of a body by those of the copy that is nearest to its former boxes.
-   pure subroutine place_near(cell, folds, former, bounds)
+   pure subroutine place_near(cell, inverse_period, former, bounds)
       type(cell_t), intent(in) :: cell
       !> 1/size along both axes, 0 where the body does not repeat [1/m]
-      real(wp), intent(in) :: folds(2)
+      real(wp), intent(in) :: inverse_period(2)
       !> Former bounds of the first box [m]
       real(wp), intent(in) :: former(4)
       !> Bounds of the boxes at the position of the body, (4, box) [m]
@@ -137,9 +137,9 @@ contains
       real(wp) :: shift(2)
       integer :: b
 
-      shift(2) = anint((former(2) - bounds(2, 1))*folds(2))
+      shift(2) = anint((former(2) - bounds(2, 1))*inverse_period(2))
       shift(1) = shift(2)*cell%shift
-      shift(1) = shift(1) + anint((former(1) - (bounds(1, 1) + shift(1)))*folds(1))*cell%size(1)
+      shift(1) = shift(1) + anint((former(1) - (bounds(1, 1) + shift(1)))*inverse_period(1))*cell%size(1)
       shift(2) = shift(2)*cell%size(2)
       if (.not. any(abs(shift) > 0.0_wp)) return
       do b = 1, size(bounds, 2)

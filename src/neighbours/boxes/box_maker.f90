@@ -394,7 +394,7 @@ contains
       ! All boxes of a body move together.
       former = boxes%bounds(:, first)
       call bound_body(maker, bodies%position(:, s), s, extent, direction, boxes)
-      call place_near(bodies%cell, bodies%folds(:, s), former, boxes%bounds(:, first:last))
+      call place_near(bodies%cell, bodies%inverse_period(:, s), former, boxes%bounds(:, first:last))
    end subroutine bound_in_cell
 
 end module polydem_box_maker

@@ -187,24 +187,24 @@ contains
       integer(hsize_t), intent(in) :: row(:)
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: space, properties, dataset
-      integer(hsize_t) :: extent(size(row) + 1), limit(size(row) + 1), chunk(size(row) + 1)
+      integer(hsize_t) :: chunk(size(row) + 1), batch
       integer(size_t) :: bytes
       integer :: n, status, ignored
 
       n = size(row) + 1
-      extent = [row, 0_hsize_t]
-      limit = [row, h5s_unlimited_f]
+      batch = int(location%batch, hsize_t)
       call h5tget_size_f(kind_in_file, bytes, status)
       chunk(:n - 1) = max(1_hsize_t, row)
-      chunk(n) = max(1_hsize_t, chunk_bytes/(product(chunk(:n - 1))*int(bytes, hsize_t)))
+      chunk(n) = max(1_hsize_t, chunk_bytes/(product(chunk(:n - 1))*int(bytes, hsize_t)*batch))
       if (location%expected_rows > 0_lp) then
-         associate (expected => int(location%expected_rows, hsize_t))
+         associate (expected => (int(location%expected_rows, hsize_t) + batch - 1_hsize_t)/batch)
             chunk(n) = min(chunk(n), (expected + expected_chunks - 1_hsize_t)/expected_chunks)
             ! As many chunks as these need, of equal size
             chunk(n) = 1_hsize_t + (expected - 1_hsize_t)/(1_hsize_t + (expected - 1_hsize_t)/chunk(n))
          end associate
       end if
-      call h5screate_simple_f(n, extent, space, status, limit)
+      chunk(n) = chunk(n)*batch
+      call h5screate_simple_f(n, [row, 0_hsize_t], space, status, [row, h5s_unlimited_f])
       if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
       if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)
       if (status >= 0 .and. location%compressed) call compress(properties, status)

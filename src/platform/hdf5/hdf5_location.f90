@@ -25,6 +25,8 @@ module polydem_hdf5_location
       logical :: together = .false.
       !> Number of rows that a new extendible data set will probably get; 0: unknown
       integer(lp) :: expected_rows = 0_lp
+      !> Number of rows that belong together: a chunk has a multiple of it
+      integer(lp) :: batch = 1_lp
    end type dataset_location_t
 
    !> H5E_error2_t of HDF5: an entry of its stack of errors

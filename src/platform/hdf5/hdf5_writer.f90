@@ -31,6 +31,8 @@ module polydem_hdf5_writer
       private
       !> Expected number of rows of a new extendible data set, for one_row and many_rows; 0: unknown
       integer(lp) :: expected(2) = 0_lp
+      !> Rows that belong together, for many_rows
+      integer(lp) :: batch = 1_lp
    contains
       procedure :: expect_rows
       !> Write a new data set, or append rows to an extendible one: write(name, values, error, unit, meaning, part,
@@ -48,13 +50,17 @@ contains
 
    !> Set how many rows extendible data sets will probably get. Their chunks are then so small that a small file stays
    !> small. More rows are possible.
-   subroutine expect_rows(self, single, many)
+   subroutine expect_rows(self, single, many, batch)
       class(hdf5_writer_t), intent(inout) :: self
       !> Rows of data sets that grow by one row at a time, and of those that grow by many; 0: unknown
       integer(lp), intent(in) :: single, many
+      !> Number of the many rows that belong together, so that chunks get a multiple of it; default: 1
+      integer(lp), intent(in), optional :: batch
 
       self%expected(one_row) = single
       self%expected(many_rows) = many
+      self%batch = 1_lp
+      if (present(batch)) self%batch = max(1_lp, batch)
    end subroutine expect_rows
 
    !> Write contiguous values as a new data set, as another part of one, or as rows of an extendible one. A new data set
@@ -87,6 +93,7 @@ contains
       if (present(rows)) then
          if (rows == one_row) extent = [extent, 1_hsize_t]
          location%expected_rows = self%expected(rows)
+         if (rows == many_rows) location%batch = self%batch
          call append_rows_to(location, kind_in_file, &
                              slab_of(location, extent, address, max(1, n_dimensions), part), error)
       else

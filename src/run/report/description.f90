@@ -38,7 +38,7 @@ contains
          call log%write_line('bodies     '//to_text(measures%free)//' free, '//to_text(measures%fixed)//' fixed, '// &
                              to_text(measures%corners)//' vertices')
          if (s%bodies%cell%is_periodic) call log%write_line('cell       '//cell_text(s))
-         if (allocated(s%traffic)) call write_sources(s, log)
+         if (allocated(s%sources_and_sinks)) call write_sources(s, log)
          call write_measures(measures, log)
          call log%write_line('boxes      '//to_text(measures%boxes)//', including '//to_text(measures%fixed_boxes)// &
                              ' of fixed bodies')
@@ -114,8 +114,9 @@ contains
       real(wp) :: mass
       integer :: k
 
-      do k = 1, size(simulation%traffic%sources)
-         associate (source => simulation%traffic%sources(k), given => simulation%traffic%sources(k)%settings)
+      do k = 1, size(simulation%sources_and_sinks%sources)
+         associate (source => simulation%sources_and_sinks%sources(k), &
+                    given => simulation%sources_and_sinks%sources(k)%settings)
             mass = source%mean_mass()
             text = 'source     '//given%name//': bodies of '//to_text(mass, 3)//' kg/m on average'
             if (given%count > 0) text = text//', up to '//to_text(given%count)//' free bodies in the run'

@@ -33,9 +33,9 @@ contains
          call warn_of_loads(simulation, log)
          call warn_of_passing_walls(simulation, log)
       end if
-      if (.not. allocated(simulation%traffic)) return
-      do k = 1, size(simulation%traffic%sources)
-         call warn_of_source(simulation, simulation%traffic%sources(k), log)
+      if (.not. allocated(simulation%sources_and_sinks)) return
+      do k = 1, size(simulation%sources_and_sinks%sources)
+         call warn_of_source(simulation, simulation%sources_and_sinks%sources(k), log)
       end do
    end subroutine write_end_warnings
 

@@ -17,7 +17,7 @@ contains
 
       call set_sample_columns(self, self%series%row)
       call set_wall_columns(self%walls, self%comm, self%dt, self%bodies, self%loop%walls, self%series%row)
-      if (allocated(self%traffic)) call self%traffic%set_columns(self%series%row)
+      if (allocated(self%sources_and_sinks)) call self%sources_and_sinks%set_columns(self%series%row)
    end subroutine collect_row
 
 end module polydem_series_row

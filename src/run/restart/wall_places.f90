@@ -1,7 +1,7 @@
 !> Places of walls in a run that goes on with other motions.
 module polydem_wall_places
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: nearest_copy
+   use polydem_cell, only: minimum_image
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp
@@ -35,7 +35,7 @@ contains
             if (.not. simulation%walls%wall(k)%is_driven()) cycle
             do j = 1_ip, size(simulation%walls%wall(k)%slots, kind=ip)
                associate (s => simulation%walls%wall(k)%slots(j))
-                  offset = nearest_copy(bodies%cell, bodies%cell%inverse, moved%position(:, s) - bodies%position(:, s))
+                  offset = minimum_image(bodies%cell, bodies%cell%inverse, moved%position(:, s) - bodies%position(:, s))
                   way = hypotenuse(offset(1), offset(2)) + abs(moved%angle(s) - bodies%angle(s))*bodies%diameter(s)
                   if (way <= most_way*bodies%diameter(s)) cycle
                   call raise(error, input_error, 'the changed motions would move body '//to_text(bodies%id(s))// &

@@ -4,7 +4,7 @@ module polydem_exchanged_bodies
    use polydem_actions, only: action_t, actions_t, add_bodies, remove_bodies
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_cell, only: cell_t, into_cell, nearest_copy
+   use polydem_cell, only: cell_t, into_cell, minimum_image
    use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
@@ -173,8 +173,8 @@ contains
             if (self%bodies%removed(s)) cycle
          end if
          if (any(removed == self%bodies%id(s))) cycle
-         if (self%bodies%fixed(s) .and. allocated(self%bodies%folds)) then
-            if (overlap(self%bodies, s, self%bodies%folds(:, s))) call refuse()
+         if (self%bodies%fixed(s) .and. allocated(self%bodies%inverse_period)) then
+            if (overlap(self%bodies, s, self%bodies%inverse_period(:, s))) call refuse()
          else if (overlap(self%bodies, s, self%bodies%cell%inverse)) then
             call refuse()
          end if
@@ -189,16 +189,16 @@ contains
       end subroutine refuse
 
       !> Whether the body overlaps another one
-      logical function overlap(bodies, s, folds)
+      logical function overlap(bodies, s, inverse_period)
          type(bodies_t), intent(in) :: bodies
          !> Slot of the other one
          integer(ip), intent(in) :: s
-         !> As of `nearest_copy`
-         real(wp), intent(in) :: folds(2)
+         !> As of `minimum_image`
+         real(wp), intent(in) :: inverse_period(2)
          real(wp) :: offset(2)
          integer(ip) :: p, pieces(2), own(2)
 
-         offset = nearest_copy(self%bodies%cell, folds, bodies%position(:, s) - added%position(:, k))
+         offset = minimum_image(self%bodies%cell, inverse_period, bodies%position(:, s) - added%position(:, k))
          overlap = .false.
          if (hypotenuse(offset(1), offset(2)) >= bodies%radius(s) + added%radius(k)) return
          own = added%pieces%pieces_of(k)

@@ -179,8 +179,8 @@ contains
       type(simulation_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. allocated(self%traffic)) call raise(error, input_error, 'the run does not expect that bodies enter '// &
-         'or leave: make it with exchange=True')
+      if (.not. allocated(self%sources_and_sinks)) call raise(error, input_error, &
+         'the run does not expect that bodies enter or leave: make it with exchange=True')
    end subroutine check_exchange
 
    !> Check that no action before has removed bodies.
@@ -271,7 +271,8 @@ contains
                                             ' cannot turn, since its copies do not')
          do axis = 1, 2
             if (bodies%cell%size(axis) > 0.0_wp .and. abs(velocity(axis)) > 0.0_wp .and. &
-                any(.not. bodies%folds(axis, wall%slots) > 0.0_wp)) call raise(error, input_error, 'the wall '// &
+                any(.not. bodies%inverse_period(axis, wall%slots) > 0.0_wp)) call raise(error, input_error, &
+               'the wall '// &
                wall%name//' spans the cell and cannot move along '//'xy'(axis:axis))
          end do
       end associate

@@ -23,7 +23,7 @@ module polydem_exchange_bodies
    use polydem_simulation, only: simulation_t, time_of
    use polydem_sort, only: ascending_order, place_in
    use polydem_source, only: candidate_t, source_t
-   use polydem_traffic, only: departure_t, is_due, number_of_values
+   use polydem_sources_and_sinks, only: departure_t, is_due, number_of_values
    use polydem_wall_energy, only: release_energy
    implicit none
    private
@@ -43,8 +43,8 @@ contains
       logical, allocatable :: kept(:)
       integer, allocatable :: origin(:)
 
-      if (.not. (self%traffic%has_event(self%step) .or. size(removed_after(self%actions, self%step)) > 0 .or. &
-                 number_added(self%actions, self%step) > 0)) return
+      if (.not. (self%sources_and_sinks%has_event(self%step) .or. number_added(self%actions, self%step) > 0 &
+                 .or. size(removed_after(self%actions, self%step)) > 0)) return
       call find_leaving(self)
       call list_departures(self, departing, kept)
       list%rank = self%comm%rank
@@ -55,17 +55,18 @@ contains
          if (self%settings%output%energy_balance) then
             call undo_change(self%energy_balance, self%comm, self%dt, self%forces%gravity, self%bodies, .not. kept)
             call take_leaving(self%energy_balance, self%dt, last_gravity(self%energy_balance, self%forces%gravity), &
-                              self%traffic%leaving(:n_totals))
-            call release_energy(self%energy_balance, self%traffic%leaving(n_totals + 1))
+                              self%sources_and_sinks%leaving(:n_totals))
+            call release_energy(self%energy_balance, self%sources_and_sinks%leaving(n_totals + 1))
          end if
-         call self%traffic%keep_departures(self%step + 1_lp, real(self%step + 1_lp, dp)*real(self%dt, dp), departing)
+         call self%sources_and_sinks%keep_departures(self%step + 1_lp, real(self%step + 1_lp, dp)*real(self%dt, dp), &
+                                                    departing)
       end if
-      if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
+      if (allocated(self%sources_and_sinks%leaving)) deallocate (self%sources_and_sinks%leaving)
       if (size(departing%id) == 0 .and. list%n == 0_ip) return
       call new_bodies(list, added, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call count_masses(self%comm, added, origin, self%traffic%sources)
+      call count_masses(self%comm, added, origin, self%sources_and_sinks%sources)
       if (self%settings%output%energy_balance) call count_entering(self%energy_balance, self%comm, self%dt, &
          self%forces%gravity, added)
       call replace_bodies(self, kept, added, error)
@@ -98,7 +99,7 @@ contains
    !> Find what the balance must know of the bodies that leave before the next step, unless a restart has read it: their
    !> totals, and the elastic energy of their contacts. Collective.
    subroutine find_leaving(self)
-      !> The simulation between two steps; `leaving` of its traffic is set
+      !> The simulation between two steps; `leaving` of its sources and sinks is set
       type(simulation_t), intent(inout) :: self
       type(departure_t) :: departing
       type(exact_sum_t) :: released(1)
@@ -106,9 +107,9 @@ contains
       real(wp) :: total(n_totals)
       integer(ip) :: c
 
-      if (.not. allocated(self%traffic)) return
+      if (.not. allocated(self%sources_and_sinks)) return
       if (self%loop%step /= self%step .or. .not. self%settings%output%energy_balance) return
-      if (allocated(self%traffic%leaving)) deallocate (self%traffic%leaving)
+      if (allocated(self%sources_and_sinks%leaving)) deallocate (self%sources_and_sinks%leaving)
       call list_departures(self, departing, kept)
       if (size(departing%id) == 0) return
       call find_leaving_totals(self%energy_balance, self%comm, &
@@ -126,7 +127,7 @@ contains
          end if
       end associate
       call all_reduce_exact_sums(self%comm, released)
-      self%traffic%leaving = [total, released%value()]
+      self%sources_and_sinks%leaving = [total, released%value()]
 
    contains
 
@@ -169,7 +170,7 @@ contains
       allocate (kept(self%bodies%n), source=.true.)
       allocate (departing%id(0), departing%sink(0), departing%value(number_of_values, 0))
       removed = removed_after(self%actions, self%step)
-      if (.not. self%traffic%has_departures(self%step) .and. size(removed) == 0) return
+      if (.not. self%sources_and_sinks%has_departures(self%step) .and. size(removed) == 0) return
       allocate (mine(0), values(0))
       do k = 1_ip, size(self%bodies%free, kind=ip)
          associate (s => self%bodies%free(k), bodies => self%bodies)
@@ -206,8 +207,8 @@ contains
       !> Place of the body [m]
       real(wp), intent(in) :: point(2)
 
-      do number = 1_ip, size(self%traffic%sinks, kind=ip)
-         associate (sink => self%traffic%sinks(number))
+      do number = 1_ip, size(self%sources_and_sinks%sinks, kind=ip)
+         associate (sink => self%sources_and_sinks%sinks(number))
             if (copies_within(self%bodies%cell, sink%settings%low, sink%settings%high, point) == 0_ip) cycle
             if (is_due(sink%settings%interval, sink%stage, self%step, self%stages%number)) return
          end associate
@@ -234,8 +235,8 @@ contains
 
       allocate (circles(3, 0), origin(0))
       if (number_added(self%actions, self%step) > 0) call admit_added(self, circles, list, origin)
-      do k = 1, size(self%traffic%sources)
-         associate (source => self%traffic%sources(k))
+      do k = 1, size(self%sources_and_sinks%sources)
+         associate (source => self%sources_and_sinks%sources(k))
             if (.not. is_due(source%settings%interval, source%stage, self%step, self%stages%number)) cycle
             n_free = int(self%bodies%n_all - count(self%bodies%fixed, kind=ip) + list%n, lp) - n_leaving
             first = 0_lp

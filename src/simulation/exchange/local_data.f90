@@ -2,7 +2,7 @@
 !> history, limits of the guards.
 module polydem_local_data
    use polydem_bodies, only: bodies_t
-   use polydem_bodies_in_cell, only: find_folds
+   use polydem_bodies_in_cell, only: find_periods
    use polydem_box_maker, only: new_box_maker
    use polydem_contact_flags, only: flag_limits_t
    use polydem_contact_history, only: add_column, contact_history_t
@@ -34,7 +34,7 @@ contains
 
       call self%walls%find_slots(self%bodies)
       call self%walls%mark_removed(self%bodies)
-      call find_folds(self%bodies)
+      call find_periods(self%bodies)
       call self%law%measure(self%bodies)
       if (self%stages%number > 0_ip .or. allocated(self%actions)) &
          call self%law%scale_friction(self%stages%friction_scale)

@@ -1,7 +1,7 @@
 !> Room for bodies that enter: they are compared with others by circles around them, with fixed ones by their outlines.
 module polydem_room
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: into_cell, nearest_copy
+   use polydem_cell, only: into_cell, minimum_image
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_source, only: candidate_t
@@ -44,7 +44,7 @@ contains
       do k = 1_ip, size(bodies%free, kind=ip)
          associate (s => bodies%free(k))
             if (.not. kept(s)) cycle
-            offset = nearest_copy(bodies%cell, bodies%cell%inverse, bodies%position(:, s) - point)
+            offset = minimum_image(bodies%cell, bodies%cell%inverse, bodies%position(:, s) - point)
             ! Copies above and below that slide may be nearer along x.
             if (bodies%cell%is_sheared) offset(1) = 0.0_wp
             if (hypotenuse(offset(1), offset(2)) >= reach + bodies%radius(s)) cycle
@@ -68,7 +68,7 @@ contains
 
       meets_any = .true.
       do k = 1, size(circles, 2)
-         offset = nearest_copy(bodies%cell, bodies%cell%inverse, circles(1:2, k) - centre)
+         offset = minimum_image(bodies%cell, bodies%cell%inverse, circles(1:2, k) - centre)
          if (sum(offset**2) < (radius + circles(3, k))**2) return
       end do
       meets_any = .false.
@@ -80,7 +80,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Centre and radius [m]
       real(wp), intent(in) :: centre(2), radius
-      real(wp) :: offset(2), folds(2)
+      real(wp) :: offset(2), inverse_period(2)
       integer(ip) :: p, pieces(2), s
 
       meets_fixed = .true.
@@ -90,9 +90,9 @@ contains
             if (bodies%removed(s)) cycle
          end if
          offset = centre - bodies%position(:, s)
-         folds = 0.0_wp
-         if (allocated(bodies%folds)) folds = bodies%folds(:, s)
-         offset = nearest_copy(bodies%cell, folds, offset)
+         inverse_period = 0.0_wp
+         if (allocated(bodies%inverse_period)) inverse_period = bodies%inverse_period(:, s)
+         offset = minimum_image(bodies%cell, inverse_period, offset)
          if (hypotenuse(offset(1), offset(2)) >= radius + bodies%radius(s)) cycle
          pieces = bodies%pieces%pieces_of(s)
          do p = pieces(1), pieces(2)

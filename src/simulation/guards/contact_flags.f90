@@ -12,7 +12,7 @@
 !> reverses, but this is harmless.
 module polydem_contact_flags
    use polydem_bodies, only: bodies_t
-   use polydem_cell, only: nearest_copy
+   use polydem_cell, only: minimum_image
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
@@ -159,7 +159,7 @@ contains
 
       place = bodies%position(:, s) - bodies%position(:, other)
       if (bodies%cell%is_periodic) &
-         place = nearest_copy(bodies%cell, min(bodies%folds(:, s), bodies%folds(:, other)), place)
+         place = minimum_image(bodies%cell, min(bodies%inverse_period(:, s), bodies%inverse_period(:, other)), place)
       associate (pieces => bodies%pieces)
          place = place + (pieces%arm(:, piece) - pieces%arm(:, of_other))
          inside = .true.
@@ -186,7 +186,7 @@ contains
       x = bodies%position(1, s) - bodies%position(1, other)
       y = bodies%position(2, s) - bodies%position(2, other)
       if (bodies%cell%is_periodic) then
-         offset = nearest_copy(bodies%cell, min(bodies%folds(:, s), bodies%folds(:, other)), [x, y])
+         offset = minimum_image(bodies%cell, min(bodies%inverse_period(:, s), bodies%inverse_period(:, other)), [x, y])
          x = offset(1)
          y = offset(2)
       end if

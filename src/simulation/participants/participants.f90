@@ -5,11 +5,11 @@ module polydem_participants
    use polydem_kinds, only: wp
    use polydem_loaded_walls, only: loaded_walls_t
    use polydem_moving_cell, only: moving_cell_t
-   use polydem_new_traffic, only: start_traffic
+   use polydem_new_sources_and_sinks, only: start_sources_and_sinks
    use polydem_recorded_walls, only: recorded_walls_t
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_item_t, participant_t, simulation_t
-   use polydem_sources_and_sinks, only: sources_and_sinks_t
+   use polydem_body_exchange, only: body_exchange_t
    use polydem_undirected_contacts, only: undirected_contacts_t
    use polydem_wall_removal, only: wall_removal_t
    implicit none
@@ -27,7 +27,7 @@ contains
 
       allocate (list(0))
       if (self%walls%has_gates()) call add(wall_removal_t())
-      if (allocated(self%traffic)) call add(sources_and_sinks_t())
+      if (allocated(self%sources_and_sinks)) call add(body_exchange_t())
       if (self%bodies%cell%is_sheared .or. allocated(self%bodies%cell%load)) &
          call add(moving_cell_t(needs_all_ranks=allocated(self%bodies%cell%load)))
       if (allocated(self%walls%loads)) call add(loaded_walls_t(needs_all_ranks=.true.))
@@ -58,8 +58,8 @@ contains
       !> The simulation at time 0
       type(simulation_t), intent(inout) :: self
 
-      if (allocated(self%traffic)) return
-      call start_traffic(0, 0, self%traffic)
+      if (allocated(self%sources_and_sinks)) return
+      call start_sources_and_sinks(0, 0, self%sources_and_sinks)
       call expect_changes(self%energy_balance)
       call choose_participants(self)
    end subroutine allow_exchange

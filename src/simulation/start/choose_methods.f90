@@ -11,7 +11,7 @@ module polydem_choose_methods
    use polydem_participants, only: choose_participants
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_new_traffic, only: new_traffic
+   use polydem_new_sources_and_sinks, only: new_sources_and_sinks
    implicit none
    private
    public :: choose_methods
@@ -30,7 +30,7 @@ contains
          call choose_parts(self%forces, self%law, pair_parameters(settings, self%forces))
          call self%law%check(settings, 1_ip, error)
          if (allocated(error)) return
-         call new_traffic(settings, self%traffic, error)
+         call new_sources_and_sinks(settings, self%sources_and_sinks, error)
          if (allocated(error)) return
          call new_integrator(settings%integrate, self%motion%integrator)
          call choose_finder(self%search%neighbours, settings%neighbours%finder, error, settings%neighbours%skin, &

@@ -2,7 +2,7 @@
 module polydem_divide_bodies
    use polydem_bodies, only: bodies_t, greatest_identifier
    use polydem_box_maker, only: update_boxes
-   use polydem_check_traffic, only: check_traffic
+   use polydem_check_entering, only: check_entering
    use polydem_domain, only: new_domain
    use polydem_enter_cell, only: check_constraint
    use polydem_errors, only: error_t, input_error, raise
@@ -72,7 +72,7 @@ contains
 
       call self%walls%move(0.0_wp, self%bodies)
       call update_boxes(self%search%maker, self%bodies, self%moving, self%search%boxes)
-      if (.not. allocated(error)) call check_traffic(self, error)
+      if (.not. allocated(error)) call check_entering(self, error)
       call redistribute(self, .false., error)
       call self%comm%all_reduce_error(error)
    end subroutine bound_bodies

@@ -1,7 +1,7 @@
 !> Puts the bodies of a simulation into its periodic cell at the start.
 module polydem_enter_cell
    use polydem_bodies, only: bodies_t, turn_bodies
-   use polydem_bodies_in_cell, only: add_profile, find_folds, put_into_cell, set_cell
+   use polydem_bodies_in_cell, only: add_profile, find_periods, put_into_cell, set_cell
    use polydem_cell, only: cell_t, new_cell
    use polydem_driven, only: along_angle
    use polydem_errors, only: error_t, input_error, raise
@@ -52,7 +52,7 @@ contains
          if (settings%scene%name == 'result') bodies%cell%former_jump = former_jump
          if (settings%cell%stress_controlled /= 'none') call control_stress(settings, bodies%cell)
          call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
-         call find_folds(bodies)
+         call find_periods(bodies)
          largest = 0.0_wp
          if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
          call reduce_to_greatest(self%comm, largest)
@@ -89,7 +89,8 @@ contains
       type(cell_settings_t), intent(in) :: settings
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
-      !> Bodies after `find_folds`, in a cell before its first step: its former jump is that of the shear of the bodies
+      !> Bodies after `find_periods`, in a cell before its first step: its former jump is that of the shear of the
+      !> bodies
       type(bodies_t), intent(inout) :: bodies
 
       real(wp) :: rate
@@ -175,7 +176,7 @@ contains
                   to_text(4.0_wp*(bodies%radius(s) + self%settings%boxes%margin))//' m along '//name(axis)// &
                   ', twice its diameter, but the cell has '//to_text(cell%size(axis))//' m')
             else
-               if (bodies%folds(axis, s) > 0.0_wp) cycle
+               if (bodies%inverse_period(axis, s) > 0.0_wp) cycle
                associate (place => bodies%position(axis, s), shape => bodies%pieces%turned_polygon(s))
                   low = place + minval(shape(axis, :))
                   high = place + maxval(shape(axis, :))
@@ -203,7 +204,7 @@ contains
 
       associate (bodies => self%bodies, cell => self%bodies%cell, place => self%bodies%position(:, s))
          do axis = 1, 2
-            if (abs(place(axis) - cell%low(axis))*bodies%folds(axis, s) <= most_cells) cycle
+            if (abs(place(axis) - cell%low(axis))*bodies%inverse_period(axis, s) <= most_cells) cycle
             call raise(error, input_error, place_of(self%settings, 'cell', 'low')//': ''low'' in &cell: the place '// &
                to_text(place(1))//', '//to_text(place(2))//' m of body '//to_text(bodies%id(s))//' is '// &
                to_text(abs(place(axis) - cell%low(axis))*cell%inverse(axis), 3)//' cells away along '//name(axis)// &
@@ -229,7 +230,7 @@ contains
                   'out the angles of its table of motion, and loads along ''angle''', error)
                do axis = 1, 2
                   if (allocated(error)) return
-                  if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%folds(axis, s) > 0.0_wp) cycle
+                  if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%inverse_period(axis, s) > 0.0_wp) cycle
                   if (moves(self%walls, w, axis)) call refuse(self, s, 'spans the cell and cannot move along '// &
                      name(axis)//'; use a conveyor, or make it of bodies that are shorter than half the cell, for '// &
                      'example with outline = ''row'' in &wall', error)

@@ -2,7 +2,7 @@
 module polydem_start_simulation
    use polydem_begin_stage, only: continue_stages, prepare_stages
    use polydem_bodies, only: bodies_t
-   use polydem_check_traffic, only: draw_sample
+   use polydem_check_entering, only: draw_sample
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_choose_methods, only: choose_methods
    use polydem_choose_step, only: choose_step

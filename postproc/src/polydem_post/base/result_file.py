@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 #: Newest layout of files that this reader knows
-SCHEMA_VERSION = 7
+SCHEMA_VERSION = 8
 
 #: End of the name of a segment that is being written
 OPEN_SUFFIX = ".open"

@@ -31,8 +31,6 @@ class Contacts:
         force         [N/m]  force on the first body, (m, 2)
         couple        [N]    torque on the first body besides that of the force at the point, mostly 0, (m)
 
-    In results of file layouts before 7 the point is the centroid of the overlap, and the couple is not known: NaN.
-
     Found from the bodies of the frame:
 
         first_index   [1]    index of the first body in the columns of the frame, from 0, (m)
@@ -91,7 +89,7 @@ class Contacts:
     def area_gradient(self) -> FloatArray:
         """Length times normal: the integral of the outward normal over the outline of first inside second [m], (m, 2).
 
-        It is the gradient of the area when the first body moves. Files of layouts before 7 call it `normal`.
+        It is the gradient of the area when the first body moves.
         """
         return self.length[:, None] * self.normal
 

@@ -20,9 +20,6 @@ from .tables import body_table
 
 #: What a contact has of its own; the rest follows from the bodies
 CONTACT_FIELDS = ("first", "second", "area", "point", "normal", "length", "force", "couple")
-#: Those of them that files have from this layout on
-NEW_CONTACT_FIELDS = ("length", "couple")
-CONTACT_LAYOUT = 7
 
 #: Distances of vertices that are held in memory at once
 MOST_DISTANCES = 2**20
@@ -231,8 +228,8 @@ class Frame:
             nearest[:, 0] -= np.rint(vectors[:, 1] / self.cell_size[1]) * self.shift
         for axis in np.flatnonzero(self.cell_size > 0.0):
             size = self.cell_size[axis]
-            folded = ~(self.spans[first, axis] | self.spans[second, axis])
-            nearest[folded, axis] -= np.rint(nearest[folded, axis] / size) * size
+            repeats = ~(self.spans[first, axis] | self.spans[second, axis])
+            nearest[repeats, axis] -= np.rint(nearest[repeats, axis] / size) * size
         return nearest
 
     @cached_property
@@ -333,10 +330,7 @@ class Frame:
 
     @cached_property
     def torque(self) -> FloatArray:
-        """Sum of the torques of contacts on each body about its centre of mass [N], (n), from what `force` needs.
-
-        In results of file layouts before 7 it is NaN for free bodies with contacts, whose couples are not known.
-        """
+        """Sum of the torques of contacts on each body about its centre of mass [N], (n), from what `force` needs."""
         total, contacts = np.zeros(len(self)), self.contacts
         np.add.at(total, contacts.first_index, _cross(contacts.first_arm, contacts.force) + contacts.couple)
         np.subtract.at(total, contacts.second_index, _cross(contacts.second_arm, contacts.force) + contacts.couple)
@@ -401,8 +395,7 @@ class _Given:
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
     """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0.
 
-    Columns of file layouts before 7 have no length and no couple, and the area gradient as normal. Columns of other
-    names become those of `others`.
+    Columns of other names become those of `others`.
     """
     first, second = (_index_of(frame, columns[name]) for name in ("first", "second"))
     branch = frame.position[first] - frame.position[second]
@@ -410,11 +403,6 @@ def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
     if frame.cell_size.any():
         branch = frame.nearest(first, second, branch)
         second_arm = first_arm + branch
-    if "length" not in columns:
-        length = np.hypot(*columns["normal"].T)
-        # A contact without direction, one body inside the other, has that of the line of centres, as in the program.
-        way = np.where(length[:, None] > 0.0, columns["normal"], -branch)
-        columns = {**columns, "length": length, "normal": unit_vectors(way), "couple": np.full(len(first), np.nan)}
     return Contacts(
         **{name: columns[name] for name in CONTACT_FIELDS},
         others={name: values for name, values in columns.items() if name not in CONTACT_FIELDS},

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.result_file import (
     OPEN_SUFFIX,
+    SCHEMA_VERSION,
     ResultError,
     balance_of,
     cannot_read,
@@ -77,6 +78,10 @@ def _read_closed(path: Path, closed: Closed | None) -> Segment | None:
             return None
         file = h5py.h5f.open(os.fsencode(path), h5py.h5f.ACC_RDONLY)
         try:
+            layout = np.empty((), np.int64)
+            h5py.h5a.open(file, b"schema_version").read(layout)
+            if layout != SCHEMA_VERSION:
+                return None
             for name in (b"frames", b"frames/step", b"frames/time"):
                 if file.links.get_info(name).type != h5py.h5l.TYPE_HARD:
                     return None
@@ -103,6 +108,10 @@ def read_segment(path: Path) -> Segment:
     with reading(path) as file:
         if "frames" not in file:
             raise ResultError(f"{path}: is not a segment of a trajectory")
+        layout = int(file.attrs["schema_version"])
+        if layout != SCHEMA_VERSION:
+            raise ResultError(f"{path}: has file layout {layout} of an earlier version of polydem, but this one reads "
+                              f"only layout {SCHEMA_VERSION}; run its scene again, or use the version that wrote it")
         n = _complete_frames(file)
         segment = Segment(path, file["frames/step"][:n], file["frames/time"][:n])
         insist(path, "frames", {"step": segment.steps, "time": segment.times}, {"step": (n,), "time": (n,)})
@@ -111,39 +120,7 @@ def read_segment(path: Path) -> Segment:
         return segment
 
 
-class FrameRows:
-    """Where the bodies of the frames of an open segment are: the one place that knows both forms of a segment.
-
-    Usually each column of /frames has one row per frame. If bodies enter or leave, it has one row per body of each
-    frame, and `id` says which body of /bodies that is.
-    """
-
-    def __init__(self, file: h5py.File):
-        self._frames = file["frames"]
-        self.is_ragged = "start" in self._frames
-
-    def column(self, name: str, row: int) -> np.ndarray:
-        """A column of a frame by its row in the segment."""
-        return self._frames[name][self._rows(row)]
-
-    def kept(self, row: int, identifiers: np.ndarray) -> np.ndarray | None:
-        """Which of the bodies of a segment a frame has; None: all of them."""
-        if not self.is_ragged:
-            return None
-        present = self._frames["id"][self._rows(row)]
-        kept = np.isin(identifiers, present)
-        if np.count_nonzero(kept) != len(present):
-            raise ResultError(f"{self._frames.file.filename}: frames/id names bodies that bodies/id does not have")
-        return kept
-
-    def _rows(self, row: int) -> slice | int:
-        if not self.is_ragged:
-            return row
-        low, high = (int(each) for each in self._frames["start"][row : row + 2])
-        return slice(low, high)
-
-
-#: Columns of /frames with one row per frame in any segment
+#: Columns of /frames with one row per frame; the others have one per body of each frame
 ROWS_OF_FRAMES = ("step", "time", "shift", "jump", "cell_low", "cell_size")
 
 
@@ -152,22 +129,22 @@ def _complete_frames(file: h5py.File) -> int:
 
     A program that dies while it writes a frame may leave some data sets one row longer than others.
     """
-    frames = dict(entries_of(file["frames"]))
-    listed = [name for name in ("frames", "contacts") if name in file and "start" in file[name]]
-    if "frames" in listed:
-        frames = {name: values for name, values in frames.items() if name in ROWS_OF_FRAMES}
-    growing = [*frames.values(), *(values for _, values in entries_of(balance_of(file)))]
+    growing = [values for name, values in entries_of(file["frames"]) if name in ROWS_OF_FRAMES]
+    growing += [values for _, values in entries_of(balance_of(file))]
     if "walls" in file:
         growing += [values for name, values in entries_of(file["walls"]) if name != "id"]
     n = min(len(values) for values in growing)
-    for name in listed:
-        start = file[f"{name}/start"][:]
-        rows = min(len(values) for key, values in entries_of(file[name]) if key not in ("start", *ROWS_OF_FRAMES))
-        n = min(n, int(np.searchsorted(start, rows, side="right")) - 1)
+    listed = {name: [values for key, values in entries_of(file[name]) if key not in ("start", *ROWS_OF_FRAMES)]
+              for name in ("frames", "contacts") if name in file}
+    starts = {name: file[f"{name}/start"][:] for name in listed}
+    for name, columns in listed.items():
+        n = min(n, int(np.searchsorted(starts[name], min(map(len, columns)), side="right")) - 1)
     while n > 0:
         try:
             for values in growing:
                 values[n - 1]
+            for values in listed["frames"]:
+                values[slice(*starts["frames"][n - 1:n + 1])]
             return n
         except OSError as error:
             if is_refused(error):

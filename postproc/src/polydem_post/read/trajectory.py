@@ -24,9 +24,9 @@ from ..base.result_file import (
     series_of,
 )
 from .contacts import Contacts, Walls
-from .frames import CONTACT_FIELDS, CONTACT_LAYOUT, NEW_CONTACT_FIELDS, Frame, find_contacts, sound_frame
+from .frames import CONTACT_FIELDS, Frame, find_contacts, sound_frame
 from .result_folder import ResultFolder
-from .segments import FrameRows, Segment
+from .segments import Segment
 from .settings import Settings
 from .tables import OTHER_BODIES, trajectory_dataset, trajectory_table
 
@@ -64,7 +64,8 @@ class Trajectory:
         self.steps = self._files.steps
         #: Numbers of the frames of this trajectory in the whole run
         self._numbers = np.arange(len(self.times))
-        self._bodies: tuple[Path | None, dict[str, Any]] = (None, {})
+        #: Segment that was read last, with its bodies and the first row of each of its frames
+        self._bodies: tuple[Path | None, dict[str, Any], Any] = (None, {}, ())
         #: What is added to positions and points of contact [m], (2); None if nothing is
         self._shift: npt.NDArray[np.float64] | None = None
 
@@ -361,21 +362,19 @@ class Trajectory:
 
     def _frame_in(self, file: h5py.File, segment: Segment, row: int, number: int) -> Frame:
         frames = file["frames"]
-        rows = FrameRows(file)
-        # A run that goes on appends bodies to its open segment.
-        if self._bodies[0] != segment.path or (rows.is_ragged and len(file["bodies/id"]) != len(self._bodies[1]["id"])):
-            self._bodies = (segment.path, _bodies_in(file))
-        bodies = self._bodies[1]
+        bodies_change = "id" in frames
+        # A run that goes on appends frames, and perhaps bodies, to its open segment.
+        if (self._bodies[0] != segment.path or row + 1 >= len(self._bodies[2])
+                or (bodies_change and len(file["bodies/id"]) != len(self._bodies[1]["id"]))):
+            self._bodies = (segment.path, _bodies_in(file), frames["start"][:])
+        _, bodies, start = self._bodies
+        rows = slice(int(start[row]), int(start[row + 1]))
         if "cell_size" in frames:
             bodies = {**bodies, "cell_low": frames["cell_low"][row], "cell_size": frames["cell_size"][row]}
-        kept = rows.kept(row, bodies["id"])
-        if kept is not None:
-            bodies = chosen_bodies(kept, bodies)
+        if bodies_change:
+            bodies = chosen_bodies(_present(segment.path, frames["id"][rows], bodies["id"]), bodies)
         crossed = [name for name in ("image", "shear_offset") if name in frames]
-        if "slid" in frames:
-            raise ResultError(f"{segment.path}: is of an earlier revision: `frames/slid` has the name "
-                              "`frames/shear_offset` today; run the scene again")
-        columns = {name: rows.column(name, row) for name in (*GROWING, *crossed)}
+        columns = {name: frames[name][rows] for name in (*GROWING, *crossed)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
         jump = self._jump(bodies["cell_size"][1], float(segment.times[row])) if "shift" in frames else 0.0
         if self._shift is not None:
@@ -402,11 +401,10 @@ class Trajectory:
                 raise ResultError(f"{segment.path}: holds no contacts; run with output.contacts = .true.")
             group = file["contacts"]
             low, high = (int(each) for each in group["start"][row : row + 2])
-            is_new = int(file.attrs["schema_version"]) >= CONTACT_LAYOUT
-            names = [name for name in CONTACT_FIELDS if is_new or name not in NEW_CONTACT_FIELDS]
             others = [name for name in group if name not in (*CONTACT_FIELDS, "start")]
-            columns = {name: group[name][low:high] for name in (*names, *others)}
-            shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else [])) for name in names}
+            columns = {name: group[name][low:high] for name in (*CONTACT_FIELDS, *others)}
+            shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else []))
+                      for name in CONTACT_FIELDS}
             shapes |= {name: (high - low, *group[name].shape[1:]) for name in others}
             insist(segment.path, "contacts", columns, shapes)
         if self._shift is not None:
@@ -471,6 +469,14 @@ def _without(gone: Any, columns: dict[str, Any], bodies: dict[str, Any]) -> tupl
     if kept.all():
         return columns, bodies
     return {name: values[kept] for name, values in columns.items()}, chosen_bodies(kept, bodies)
+
+
+def _present(path: Path, ids: npt.NDArray[Any], known: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Which of the bodies of a segment a frame has."""
+    kept: npt.NDArray[np.bool_] = np.isin(known, ids)
+    if np.count_nonzero(kept) != len(ids):
+        raise ResultError(f"{path}: frames/id names bodies that bodies/id does not have")
+    return kept
 
 
 def chosen_bodies(kept: npt.NDArray[np.bool_], bodies: dict[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 !> Checks of sources at the start of a run: bodies must be able to enter. And a sample of the bodies that will enter,
 !> for what a run chooses from its bodies at the start.
-module polydem_check_traffic
+module polydem_check_entering
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t, input_error, raise
@@ -13,7 +13,7 @@ module polydem_check_traffic
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: check_traffic, draw_sample
+   public :: check_entering, draw_sample
 
    !> Number of bodies of a source in a sample, and number of those whose places are tried
    integer, parameter :: n_sample = 200
@@ -35,9 +35,9 @@ contains
       integer :: j, k
 
       list%has_materials = size(self%settings%material) > 0
-      if (allocated(self%traffic)) then
-         do k = 1, size(self%traffic%sources)
-            associate (source => self%traffic%sources(k))
+      if (allocated(self%sources_and_sinks)) then
+         do k = 1, size(self%sources_and_sinks%sources)
+            associate (source => self%sources_and_sinks%sources(k))
                stream = source%shapes
                do j = 1, n_sample
                   call source%draw_shape(stream, candidate)
@@ -50,25 +50,25 @@ contains
       end if
       call new_bodies(list, sample, error)
       if (.not. allocated(error)) return
-      associate (source => self%traffic%sources((error%place - 1_lp)/n_sample + 1_lp)%settings)
+      associate (source => self%sources_and_sinks%sources((error%place - 1_lp)/n_sample + 1_lp)%settings)
          error%message = place_of(self%settings, 'source.'//source%name, 'name')//': the bodies of &source '// &
             source%name//': '//error%message
       end associate
    end subroutine draw_sample
 
    !> Check that there is room for the first bodies of each source.
-   subroutine check_traffic(self, error)
+   subroutine check_entering(self, error)
       !> The simulation with its bodies at time 0
       type(simulation_t), intent(in) :: self
       !> Names the source and what is wrong
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      if (.not. allocated(self%traffic)) return
-      do k = 1, size(self%traffic%sources)
-         if (.not. allocated(error)) call check_source(self, self%traffic%sources(k), error)
+      if (.not. allocated(self%sources_and_sinks)) return
+      do k = 1, size(self%sources_and_sinks%sources)
+         if (.not. allocated(error)) call check_source(self, self%sources_and_sinks%sources(k), error)
       end do
-   end subroutine check_traffic
+   end subroutine check_entering
 
    !> Check a source.
    subroutine check_source(self, source, error)
@@ -105,4 +105,4 @@ contains
       end associate
    end subroutine check_source
 
-end module polydem_check_traffic
+end module polydem_check_entering

@@ -36,7 +36,7 @@ def run(namelist, *options, code=0):
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("traffic")
+    folder = tmp_path_factory.mktemp("sources_and_sinks")
     (folder / "scene.nml").write_text(SCENE.format(folder=folder / "result"), encoding="utf-8")
     run(folder / "scene.nml")
     return folder / "result"

@@ -2,7 +2,7 @@
 !>
 !> What happens depends on the step, the bodies and the state here alone, which a checkpoint contains, so a restart
 !> decides alike. The step of a departure is the first one without the body.
-module polydem_traffic
+module polydem_sources_and_sinks
    use polydem_errors, only: input_error, raise
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_named_values, only: named_values_t
@@ -12,7 +12,7 @@ module polydem_traffic
    use polydem_source, only: source_t
    implicit none
    private
-   public :: traffic_t, sink_t, departure_t, set_departure, is_due, number_of_values
+   public :: sources_and_sinks_t, sink_t, departure_t, set_departure, is_due, number_of_values
 
    !> Number of values of a body that leaves: mass, velocity, place and number of the material
    integer, parameter :: number_of_values = 6
@@ -41,7 +41,7 @@ module polydem_traffic
    end type departure_t
 
    !> Sources and sinks of a run
-   type :: traffic_t
+   type :: sources_and_sinks_t
       !> Sources, in the order of the namelist
       type(source_t), allocatable :: sources(:)
       !> Sinks, likewise
@@ -56,7 +56,7 @@ module polydem_traffic
       procedure :: keep_departures
       procedure :: set_columns
       procedure :: serialize
-   end type traffic_t
+   end type sources_and_sinks_t
 
 contains
 
@@ -74,7 +74,7 @@ contains
 
    !> Whether bodies may leave after a step, in some stage
    pure logical function has_departures(self, step)
-      class(traffic_t), intent(in) :: self
+      class(sources_and_sinks_t), intent(in) :: self
       !> Number of the step
       integer(lp), intent(in) :: step
       integer :: k
@@ -87,7 +87,7 @@ contains
 
    !> Whether bodies may enter or leave after a step, in some stage
    pure logical function has_event(self, step)
-      class(traffic_t), intent(in) :: self
+      class(sources_and_sinks_t), intent(in) :: self
       !> Number of the step
       integer(lp), intent(in) :: step
       integer :: k
@@ -100,7 +100,7 @@ contains
 
    !> Count departures, and keep their rows until a file takes them.
    subroutine keep_departures(self, step, time, departing)
-      class(traffic_t), intent(inout) :: self
+      class(sources_and_sinks_t), intent(inout) :: self
       !> First step without the bodies
       integer(lp), intent(in) :: step
       !> Its time [s]
@@ -142,7 +142,7 @@ contains
 
    !> Set the columns of the series: numbers and masses so far.
    subroutine set_columns(self, row)
-      class(traffic_t), intent(in) :: self
+      class(sources_and_sinks_t), intent(in) :: self
       !> Row of the series
       type(named_values_t), intent(inout) :: row
       integer :: k
@@ -163,7 +163,7 @@ contains
 
    !> Serialize what changes.
    subroutine serialize(self, step, serializer)
-      class(traffic_t), intent(inout) :: self
+      class(sources_and_sinks_t), intent(inout) :: self
       !> Number of completed steps
       integer(lp), intent(in) :: step
       class(serializer_t), intent(inout) :: serializer
@@ -195,4 +195,4 @@ contains
       call self%departures%serialize(serializer)
    end subroutine serialize
 
-end module polydem_traffic
+end module polydem_sources_and_sinks

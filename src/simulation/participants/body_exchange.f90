@@ -1,5 +1,5 @@
 !> Sources and sinks as a participant of the steps.
-module polydem_sources_and_sinks
+module polydem_body_exchange
    use polydem_changed_bodies, only: expect_changes
    use polydem_errors, only: error_t
    use polydem_exchange_bodies, only: exchange_bodies, find_leaving
@@ -8,22 +8,22 @@ module polydem_sources_and_sinks
    use polydem_simulation, only: participant_t, simulation_t
    implicit none
    private
-   public :: sources_and_sinks_t
+   public :: body_exchange_t
 
-   !> Sources and sinks; their state is `traffic` of the simulation
-   type, extends(participant_t) :: sources_and_sinks_t
+   !> Bodies enter and leave; the state is `sources_and_sinks` of the simulation
+   type, extends(participant_t) :: body_exchange_t
    contains
       procedure :: start
       procedure :: change_bodies
       procedure :: needs_table
       procedure :: serialize
-   end type sources_and_sinks_t
+   end type body_exchange_t
 
 contains
 
    !> Prepare the balance for bodies that enter and leave.
    subroutine start(self, simulation)
-      class(sources_and_sinks_t), intent(inout) :: self
+      class(body_exchange_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
 
       associate (unused => self)
@@ -33,7 +33,7 @@ contains
 
    !> Let bodies leave and enter.
    subroutine change_bodies(self, simulation, error)
-      class(sources_and_sinks_t), intent(inout) :: self
+      class(body_exchange_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
 
@@ -44,26 +44,26 @@ contains
 
    !> Whether bodies leave behind this step: the elastic energy of their contacts leaves with them
    pure logical function needs_table(self, simulation)
-      class(sources_and_sinks_t), intent(in) :: self
+      class(body_exchange_t), intent(in) :: self
       type(simulation_t), intent(in) :: simulation
 
       associate (unused => self)
       end associate
-      needs_table = simulation%traffic%has_departures(simulation%step)
+      needs_table = simulation%sources_and_sinks%has_departures(simulation%step)
       if (allocated(simulation%actions)) needs_table = needs_table .or. &
          size(removed_after(simulation%actions, simulation%step)) > 0
    end function needs_table
 
    !> Serialize the state of all sources and sinks.
    subroutine serialize(self, simulation, serializer)
-      class(sources_and_sinks_t), intent(inout) :: self
+      class(body_exchange_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
       class(serializer_t), intent(inout) :: serializer
 
       associate (unused => self)
       end associate
       if (.not. serializer%is_reading) call find_leaving(simulation)
-      call simulation%traffic%serialize(simulation%step, serializer)
+      call simulation%sources_and_sinks%serialize(simulation%step, serializer)
    end subroutine serialize
 
-end module polydem_sources_and_sinks
+end module polydem_body_exchange
