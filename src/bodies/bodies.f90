@@ -76,6 +76,8 @@ module polydem_bodies
       real(wp), allocatable :: shear_offset(:)
       !> In a periodic cell 1/size for each body and axis, 0 along axes along which it does not repeat, (2, slot) [1/m]
       real(wp), allocatable :: inverse_period(:, :)
+      !> Works of damping and of friction on each body so far, (2, slot) [J/m]; set for a frame that has them
+      real(wp), allocatable :: work(:, :)
       !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]

@@ -4,6 +4,7 @@
 !> column of /frames. Bodies are in ascending order of identifiers, which their slots have.
 module polydem_arrays
    use polydem_bodies, only: bodies_t
+   use polydem_body_works, only: find_body_works
    use polydem_contact_columns, only: contact_columns, values_of
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
@@ -45,6 +46,9 @@ contains
             ! A step keeps the total forces on fixed bodies only.
             if (s%loop%step == s%step .and. any(name(slash + 1:) == [character(len=6) :: 'force', 'torque'])) &
                call total_forces(s%forces%gravity, s%loop%force_sums, s%bodies)
+            if (any(name(slash + 1:) == [character(len=13) :: 'damping_work', 'friction_work']) .and. &
+                s%settings%output%energy_balance) call find_body_works(s%energy_balance, s%dt, s%forces%gravity, &
+               s%loop%force_sums, s%loop%walls, s%bodies)
             call find_of_bodies(name(slash + 1:), s%bodies, width, self%integers, self%reals, error)
          case ('contacts')
             call find_of_contacts(name(slash + 1:), s%bodies, s%contacts, width, self%integers, self%reals, error)
@@ -115,6 +119,10 @@ contains
             reals = bodies%torque(:n)
          case ('shear_offset')
             if (allocated(bodies%shear_offset)) reals = bodies%shear_offset(:n)
+         case ('damping_work')
+            if (allocated(bodies%work)) reals = bodies%work(1, :n)
+         case ('friction_work')
+            if (allocated(bodies%work)) reals = bodies%work(2, :n)
          case default
             call find_integers_of_bodies(name, bodies, width, integers, error)
          end select

@@ -1,6 +1,7 @@
 !> Output of a run: frames, rows of the series and lines of the log.
 module polydem_run_output
    use polydem_balance_values, only: name_terms
+   use polydem_body_works, only: find_body_works
    use polydem_end_condition, only: condition_text, measure_condition, needs_for_stage => needs_contacts
    use polydem_end_warnings, only: warn_of_end
    use polydem_errors, only: error_t
@@ -135,6 +136,8 @@ contains
       if (run%simulation%step <= max(run%last_frame, run%previous%last_frame)) return
       if (.not. run%options%has_files) return
       associate (s => run%simulation, output => run%simulation%settings%output)
+         if (output%body_works) call find_body_works(s%energy_balance, s%dt, s%forces%gravity, s%loop%force_sums, &
+                                                     s%loop%walls, s%bodies)
          call complete_wall_forces(run%comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
          if (allocated(s%sources_and_sinks)) then
             call s%sources_and_sinks%departures%drop_rows(run%previous%last_frame)

@@ -106,11 +106,11 @@ def test_a_wall_is_continuous_and_has_the_velocity(free):
     np.testing.assert_allclose(free.walls["floor"].position, start + 100 * free.dt * np.array([0.02, 0.05]), rtol=1e-13)
     np.testing.assert_array_equal(free.walls["floor"].velocity, (0.02, 0.05))
     here = free.walls["floor"].position
-    pivot = here + (0.1, 0.0)
+    pivot = here + np.array([0.1, 0.0])
     free.walls["floor"].move((0.0, 0.1), spin=3.0, pivot=pivot)
     free.run(200)
     t = 200 * free.dt
-    turned = pivot + (0, 0.1 * t) - 0.1 * np.array([np.cos(3 * t), np.sin(3 * t)])
+    turned = pivot + np.array([0, 0.1 * t]) - 0.1 * np.array([np.cos(3 * t), np.sin(3 * t)])
     np.testing.assert_allclose(free.walls["floor"].position, turned, rtol=1e-12)
     np.testing.assert_allclose(free.bodies.angle[floor], 3 * t, rtol=1e-12)
     np.testing.assert_allclose(free.bodies.angular_velocity[floor], 3.0)

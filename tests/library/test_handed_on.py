@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import polydem
 import pytest
+from polydem_post import Trajectory
 from polydem_post.analysis import contact_loops, coordination_number
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
@@ -73,3 +74,28 @@ def test_a_run_is_a_function_of_its_entries():
     heights = [polydem.evaluate(ROOT / "inputs/first.nml", {"scene.bodies": n}, height, until=0.02)
                for n in (50, 50, 100)]
     assert heights[0] == heights[1] < heights[2]
+
+
+@pytest.mark.parametrize(("scene", "time"), [("first", 0.15), ("steady_hopper", 0.4), ("plane_shear", 0.1)])
+def test_works_on_bodies_sum_to_the_balance(tmp_path, scene, time):
+    overrides = {"integrate.duration": time, "output.body_works": True, "output.frame_interval": time / 2}
+    with polydem.Simulation(ROOT / f"inputs/{scene}.nml", overrides, folder=tmp_path / "r") as sim:
+        sim.run(until=time / 2)
+        frame, energy = sim.frame(), sim.energy
+        left = energy.get("departed_energy", 0.0)
+        for name in ("damping_work", "friction_work"):
+            found = getattr(frame, name)
+            assert np.array_equal(found[frame.free], getattr(sim.bodies, name)[~sim.bodies.fixed])
+            if not left:
+                assert found.sum() == pytest.approx(energy[name], rel=1e-11)
+        assert (frame.damping_work[frame.free] < 0).sum() > 5
+        sim.run()
+    stored = Trajectory(tmp_path / "r")
+    assert np.array_equal(stored[1].friction_work, frame.friction_work)
+    if not left and "departed_energy" not in stored.energy_balance:
+        assert stored[-1].damping_work.sum() == pytest.approx(stored.energy_balance["damping_work"][-1], rel=1e-11)
+
+
+def test_works_need_the_balance():
+    with pytest.raises(polydem.InputError, match=r"body_works' in &output needs 'energy_balance'"):
+        polydem.Simulation(ROOT / "inputs/first.nml", {"output.body_works": True, "output.energy_balance": False})

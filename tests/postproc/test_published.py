@@ -41,7 +41,7 @@ OTHERS = {
     "inputs/entries.md",
     "inputs/glossary.md",
     "inputs/how_to.md",
-    "inputs/library.md",
+    "inputs/actions.md", "inputs/library.md",
     "inputs/log.md",
     "inputs/parts.md",
     "inputs/stages.md",

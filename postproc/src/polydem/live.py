@@ -78,7 +78,8 @@ def live_frame(handle: Handle, settings: Any, source: LiveSource) -> Any:
         columns["shape"], columns["vertex_start"] = join_pieces(columns["shape"], columns["vertex_start"], piece)
     for name in ("mass", "inertia"):
         columns[name] = np.where(columns[name] == 0.0, np.inf, columns[name])
-    for name in ("material", "image", "shear_offset"):
+    works = ("damping_work", "friction_work") if settings.output.get("body_works", False) else ()
+    for name in ("material", "image", "shear_offset", *works):
         found = handle.array(f"bodies/{name}")
         if found is not None:
             columns[name] = found

@@ -27,7 +27,7 @@ NEW, FORCE, CONTINUE = 0, 1, 2
 EXCHANGE = 4
 #: Columns of the bodies, by the names of a `polydem_post` frame
 BODY_COLUMNS = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "mass", "inertia", "material",
-                "image", "vertex_start", "force", "torque")
+                "image", "vertex_start", "force", "torque", "damping_work", "friction_work")
 #: Columns of the contacts, likewise
 CONTACT_COLUMNS = ("first", "second", "area", "point", "normal", "length", "force", "couple")
 

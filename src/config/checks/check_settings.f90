@@ -73,6 +73,12 @@ contains
                ': ''energy'' in &guards needs ''energy_balance'' = .true. in &output')
          end associate
       end if
+      if (settings%output%body_works .and. .not. settings%output%energy_balance) then
+         associate (group => instances(index_of_instance(instances, 'output')))
+            call raise(error, input_error, group%values(row_of(group, 'body_works'))%place// &
+               ': ''body_works'' in &output needs ''energy_balance'' = .true.')
+         end associate
+      end if
    end subroutine check_settings
 
    !> Check the entries of gravity that changes.

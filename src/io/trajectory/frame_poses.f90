@@ -42,6 +42,13 @@ contains
                       rows=many_rows)
       call file%write('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
                       'angular velocities, anticlockwise', part, rows=many_rows)
+      if (allocated(bodies%work)) then
+         call blocks%to_blocks(comm, real(bodies%work, dp), block)
+         call file%write('/frames/damping_work', component(block, 1), error, 'J/m', &
+                         'works of the normal damping on each body so far', part, rows=many_rows)
+         call file%write('/frames/friction_work', component(block, 2), error, 'J/m', &
+                         'works of the tangential forces on each body so far', part, rows=many_rows)
+      end if
       if (.not. allocated(bodies%image)) return
       call blocks%to_blocks(comm, transpose(int(bodies%image, lp)), images)
       call file%write('/frames/image', int(images, ip), error, '1', &

@@ -68,6 +68,8 @@ class Frame:
         material_names    [1]      list of the names of the materials of the run
         image             [1]      cells crossed along each axis, (n, 2); None in the plane
         shear_offset              [m]      shifts of the borders of a sheared cell that each body has crossed, (n)
+        damping_work      [J/m]    works of the normal damping on each body so far, (n); None without `body_works`
+        friction_work     [J/m]    works of the tangential forces, likewise, (n)
         shift             [m]      displacement of the copy of a sheared cell above it, along x as of vectors
         cell_low          [m]      x and y of the lower left corner of the periodic cell, as of vectors
         cell_size         [m]      width and height of the periodic cell, as of vectors; 0 along an axis without period
@@ -96,6 +98,8 @@ class Frame:
     material_names: tuple[str, ...] = ()
     image: IntArray | None = None
     shear_offset: FloatArray | None = None
+    damping_work: FloatArray | None = None
+    friction_work: FloatArray | None = None
     shift: float = 0.0
     cell_low: FloatArray = field(default_factory=lambda: np.zeros(2))
     cell_size: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -439,8 +443,9 @@ def sound_frame(path: Path, frame: Frame) -> Frame:
     insist(path, "cell", cell, dict.fromkeys(cell, (2,)))
     if frame.image is not None:
         insist(path, "frames", {"image": frame.image}, {"image": (n, 2)})
-    if frame.shear_offset is not None:
-        insist(path, "frames", {"shear_offset": frame.shear_offset}, {"shear_offset": (n,)})
+    for name in ("shear_offset", "damping_work", "friction_work"):
+        if getattr(frame, name) is not None:
+            insist(path, "frames", {name: getattr(frame, name)}, {name: (n,)})
     masses = {"mass": frame.mass, "inertia": frame.inertia}
     if np.any(frame.material < 0) or np.any(frame.material > len(frame.material_names)):
         raise ResultError(f"{path}: bodies/material has numbers of materials that the namelist does not have")

@@ -373,8 +373,8 @@ class Trajectory:
             bodies = {**bodies, "cell_low": frames["cell_low"][row], "cell_size": frames["cell_size"][row]}
         if bodies_change:
             bodies = chosen_bodies(_present(segment.path, frames["id"][rows], bodies["id"]), bodies)
-        crossed = [name for name in ("image", "shear_offset") if name in frames]
-        columns = {name: frames[name][rows] for name in (*GROWING, *crossed)}
+        others = [name for name in ("image", "shear_offset", "damping_work", "friction_work") if name in frames]
+        columns = {name: frames[name][rows] for name in (*GROWING, *others)}
         shift = float(frames["shift"][row]) if "shift" in frames else 0.0
         jump = self._jump(bodies["cell_size"][1], float(segment.times[row])) if "shift" in frames else 0.0
         if self._shift is not None:
