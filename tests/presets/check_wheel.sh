@@ -26,14 +26,17 @@ cp "$wheel" "$scene" "$root/root/"
 # Its own /proc and /dev go with the process.
 inside() {
   # shellcheck disable=SC2016
-  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive unshare -m sh -c '
-    mount -t proc proc "$1/proc" && mount --bind /dev "$1/dev" && exec chroot "$1" sh -c "cd /root && $2"' sh "$root" "$1"
+  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive unshare -m sh -ec '
+    mount -t proc proc "$1/proc"
+    mount --bind /dev "$1/dev"
+    exec chroot "$1" sh -c "cd /root && $2"' sh "$root" "$1"
 }
 
 if inside "command -v cc gcc gfortran"; then exit 1; fi
 inside "python3 -m venv venv && venv/bin/pip install --quiet ./*.whl"
 inside "venv/bin/polydem --version 2>&1 || true" | grep -F "in the package libgomp1"
-inside "venv/bin/python -c 'import polydem; polydem.version()' 2>&1 || true" | grep "PolydemError.*in the package libgomp1"
+inside "venv/bin/python -c 'import polydem; polydem.version()' 2>&1 || true" |
+  grep "PolydemError.*in the package libgomp1"
 inside "apt-get update && apt-get install --yes --no-install-recommends libgomp1" >"$work/apt.log" 2>&1 ||
   { cat "$work/apt.log"; exit 1; }
 
