@@ -34,6 +34,7 @@ def add_binaries(tree: Path, build: Path) -> None:
     for source, target in (("library/libpolydem.so.0", package), ("app/polydem", package / "bin")):
         shutil.copy2(build / "src" / source, target)
     (about,) = tree.glob("*.dist-info")
+    shutil.copy2(ROOT / "LICENSE", about)
     scripts = tree / about.name.replace(".dist-info", ".data") / "scripts"
     scripts.mkdir(parents=True)
     script = shutil.copy(Path(__file__).with_name("wheel_script.py"), scripts / "polydem")

@@ -89,7 +89,7 @@ def installed(tmp_path_factory):
     (wheel,) = folder.glob("polydem-*-py3-none-manylinux_*.whl")
     packages = virtual_environment(folder / "venv")
     subprocess.run([sys.executable, "-m", "pip", "--python", str(folder / "venv"), "install", "--quiet", "--no-deps",
-                    "--no-index", "--disable-pip-version-check", str(wheel)], check=True)
+                    "--ignore-installed", "--no-index", "--disable-pip-version-check", str(wheel)], check=True)
     return folder / "venv" / "bin", packages
 
 
@@ -128,6 +128,7 @@ def test_a_wheel_has_its_libraries_but_for_libgomp(installed):
     inside = {path.name.partition("-")[0] for path in (packages / "polydem.libs").iterdir()}
     assert {"libgfortran", "libhdf5_serial"} <= inside or {"libgfortran", "libhdf5"} <= inside
     assert "libgomp" not in inside
+    assert list(packages.glob("polydem-*.dist-info/LICENSE"))
     for path in (packages / "polydem/libpolydem.so.0", packages / "polydem/bin/polydem"):
         code, shown, _ = call_installed("ldd", path)
         assert code == 0 and "not found" not in shown
