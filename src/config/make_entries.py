@@ -7,6 +7,7 @@ make_entries.py ENTRIES.txt FOLDER --alone: of a table with one group NAME, whic
 NAME_settings.f90 and fill_NAME.f90.
 make_entries.py ENTRIES.txt PAGE.md [--check]: the table of the manual, between the lines <!-- entries --> and
 <!-- /entries -->; with --check it must be there already.
+make_entries.py ENTRIES.txt FOLDER --package [--check]: schema.json and settings.py of the Python package polydem.
 """
 
 import sys
@@ -15,6 +16,7 @@ from pathlib import Path
 # No compiled files among the sources
 sys.dont_write_bytecode = True
 from generator.manual import update_manual  # noqa: E402
+from generator.package import update_package  # noqa: E402
 from generator.pairs import pair_module, value_module  # noqa: E402
 from generator.settings import fill_module, lone_modules, settings_module, table_module  # noqa: E402
 from generator.table import TableError, read_table  # noqa: E402
@@ -28,6 +30,12 @@ def main(table, target, *options):
         sys.exit(f"{table}: {error}")
     if target.endswith(".md"):
         update_manual(target, rows, "--check" in options)
+        return
+    if "--package" in options:
+        stale = update_package(Path(target), groups, rows, "--check" in options)
+        if stale and "--check" in options:
+            sys.exit(f"{' and '.join(stale)} in {target} are not those of the table; "
+                     "cmake --build BUILD --target entries_manual makes them")
         return
     if "--pairs" in options:
         made = {"pair_values": value_module(rows)}

@@ -1,5 +1,7 @@
 """The script that makes Fortran from the table of namelist entries: test_make_entries.py FOLDER_OF_CONFIG."""
 
+import inspect
+import json
 import sys
 import tempfile
 import unittest
@@ -8,6 +10,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
 from generator.manual import manual  # noqa: E402
+from generator.package import update_package  # noqa: E402
 from generator.pairs import pair_module, value_module  # noqa: E402
 from generator.settings import fill_module, lone_modules, settings_module, table_module  # noqa: E402
 from generator.table import TableError, read_table  # noqa: E402
@@ -132,6 +135,33 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("type, extends(source_locations_t) :: race_settings_t\n", made["race_settings"])
         self.assertIn("use polydem_kinds, only: ip\n", made["race_settings"])
         self.assertIn("   public :: fill_race\n", made["fill_race"])
+
+    def test_the_package_knows_the_entries(self):
+        groups, rows = read_table(GOOD.replace("Steps, don't", "Steps \"a\\b\", don't").replace("names", "from"))
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            self.assertEqual(update_package(folder, groups, rows, True), ["schema.json", "settings.py"])
+            self.assertEqual(list(folder.iterdir()), [])
+            update_package(folder, groups, rows, False)
+            self.assertEqual(update_package(folder, groups, rows, True), [])
+            made = json.loads((folder / "schema.json").read_text(encoding="utf-8"))["properties"]
+            source = (folder / "settings.py").read_text(encoding="utf-8")
+            (folder / "settings.py").write_text(source + "\n", encoding="utf-8")
+            self.assertEqual(update_package(folder, groups, rows, True), ["settings.py"])
+        self.assertEqual(list(made), list(groups))
+        walk, dog = made["walk"]["properties"], made["dog"]["additionalProperties"]["properties"]
+        self.assertEqual(walk["way"], {"type": "string", "enum": ["slow", "fast", "none"], "default": "slow",
+                                       "description": "Way to go; default slow."})
+        self.assertEqual([each["minItems"] for each in (walk["steps"], dog["friends"])], [2, 2])
+        self.assertEqual([list(each) for each in walk["steps"]["items"]["anyOf"]],
+                         [["minimum", "maximum"], ["maximum", "exclusiveMinimum"]])
+        self.assertEqual(list(dog), ["friends"])
+        functions = {}
+        _, _, body = source.partition("\n\n\n")
+        exec("from __future__ import annotations\n" + body, functions)
+        self.assertEqual(list(inspect.signature(functions["bag"]).parameters), ["from_"])
+        self.assertIn('Steps "a\\b", don\'t count [m]; default 0, 0; >= 0; used with way = slow, fast.',
+                      " ".join(functions["walk"].__doc__.split()))
 
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),

@@ -1,6 +1,9 @@
-"""The packages as a wheel, installed into a fresh virtual environment beside nothing but its dependencies."""
+"""The packages as a wheel, and one with program and library; installed into a fresh virtual environment beside nothing
+but its dependencies.
+"""
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -9,6 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
+PROGRAM = Path(os.environ["POLYDEM_PROGRAM"])
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +40,24 @@ def added(root):
 def test_a_wheel_has_all_files(wheel):
     inside = set(zipfile.ZipFile(wheel).namelist())
     sources = ROOT / "postproc" / "src"
-    for package in ("polydem_post", "polydem_lab"):
+    for package in ("polydem", "polydem_post", "polydem_lab"):
         for path in (sources / package).rglob("*"):
             if path.is_file() and "__pycache__" not in path.parts:
                 assert str(path.relative_to(sources)) in inside
 
 
-def test_an_installed_wheel_reads_and_exports(wheel, tmp_path, heap_with_contacts):
-    # The dependencies are those of this environment: nothing is downloaded.
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "venv")], check=True)
-    python = tmp_path / "venv" / "bin" / "python"
-    packages = next((tmp_path / "venv" / "lib").glob("python*")) / "site-packages"
-    zipfile.ZipFile(wheel).extractall(packages)
+def virtual_environment(folder):
+    """An empty environment with the dependencies of this one: nothing is downloaded."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+    packages = next((folder / "lib").glob("python*")) / "site-packages"
     (packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
+    return packages
+
+
+def test_an_installed_wheel_reads_and_exports(wheel, tmp_path, heap_with_contacts):
+    packages = virtual_environment(tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    zipfile.ZipFile(wheel).extractall(packages)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 
     def call(*words):
@@ -65,3 +74,80 @@ def test_an_installed_wheel_reads_and_exports(wheel, tmp_path, heap_with_contact
                   ["plot", "--help"], ["scale", "--help"]):
         assert call("-m", "polydem_post", *words)
     assert (tmp_path / "out.csv").exists()
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """The environment of a wheel of this build, and its packages."""
+    pytest.importorskip("auditwheel", reason="auditwheel is not installed: pip install 'postproc[recipes]'")
+    build = PROGRAM.parents[2]
+    if build.name != "release":
+        pytest.skip("a wheel is made of a release build")
+    folder = tmp_path_factory.mktemp("binary")
+    subprocess.run([sys.executable, str(ROOT / "src/packaging/make_wheel.py"), str(build), str(folder)], check=True,
+                   capture_output=True)
+    (wheel,) = folder.glob("polydem-*-py3-none-manylinux_*.whl")
+    packages = virtual_environment(folder / "venv")
+    subprocess.run([sys.executable, "-m", "pip", "--python", str(folder / "venv"), "install", "--quiet", "--no-deps",
+                    "--ignore-installed", "--no-index", "--disable-pip-version-check", str(wheel)], check=True)
+    return folder / "venv" / "bin", packages
+
+
+def call_installed(*words, **variables):
+    """Exit code, output and messages of a command that does not see this environment."""
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "POLYDEM_LIBRARY")}
+    done = subprocess.run([str(word) for word in words], env={**environment, **variables}, capture_output=True,
+                          text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_program_and_library_of_a_wheel_have_the_bits_of_the_build(installed, tmp_path):
+    programs, packages = installed
+    hashes = []
+    for number, program in enumerate((PROGRAM, programs / "polydem")):
+        code, _, errors = call_installed(program, "run", ROOT / "inputs/first.nml", "--threads", "1", "--set",
+                                         "integrate.duration=0.02", "--set", f"output.folder={tmp_path / str(number)}")
+        assert code == 0, errors
+        hashes += re.findall(r"state hash\D*(\S+)", (tmp_path / str(number) / "log.txt").read_text())
+    code, shown, errors = call_installed(programs / "python", "-c", f"""
+import polydem
+with polydem.Simulation({str(ROOT / "inputs/first.nml")!r}, {{"integrate.duration": 0.02}}) as sim:
+    sim.run()
+    print(polydem.library.find_library(), sim.state_hash)
+""")
+    assert code == 0, errors
+    place, found = shown.split()
+    assert Path(place).parent == packages / "polydem"
+    assert len(hashes) == 2 and set(hashes) == {found}
+    assert call_installed(programs / "polydem-post", "--version")[0] == 0
+    assert call_installed(programs / "polydem", "run", "none.nml")[0] == 2
+
+
+def test_a_wheel_has_its_libraries_but_for_libgomp(installed):
+    _, packages = installed
+    inside = {path.name.partition("-")[0] for path in (packages / "polydem.libs").iterdir()}
+    assert {"libgfortran", "libhdf5_serial"} <= inside or {"libgfortran", "libhdf5"} <= inside
+    assert "libgomp" not in inside
+    assert list(packages.glob("polydem-*.dist-info/LICENSE"))
+    for path in (packages / "polydem/libpolydem.so.0", packages / "polydem/bin/polydem"):
+        code, shown, _ = call_installed("ldd", path)
+        assert code == 0 and "not found" not in shown
+        place = Path(re.search(r"libgfortran\S* => (\S+)", shown)[1])
+        assert place.resolve().parent == (packages / "polydem.libs").resolve()
+
+
+def test_a_library_that_cannot_be_loaded_is_named(tmp_path):
+    (tmp_path / "libpolydem.so.0").write_text("no library")
+    load = "import polydem; polydem.version()"
+    code, _, errors = call_installed(sys.executable, "-c", load, POLYDEM_LIBRARY=str(tmp_path / "libpolydem.so.0"))
+    assert code == 1
+    assert re.search(r"PolydemError: \S+libpolydem.so.0 cannot be loaded: .*(invalid ELF|too short)", errors)
+    missing = """
+import ctypes
+def load(name):
+    raise OSError("libgomp.so.1: cannot open shared object file")
+ctypes.CDLL = load
+"""
+    code, _, errors = call_installed(sys.executable, "-c", f"{missing}{load}",
+                                     POLYDEM_LIBRARY=str(tmp_path / "libpolydem.so.0"))
+    assert code == 1 and "in Debian and Ubuntu it is in the package libgomp1" in errors

@@ -1,11 +1,12 @@
 """Simulations of polydem, stepped from Python: `Simulation` in `simulation.py`."""
 
-from . import namelist
+from . import namelist, settings
 from .errors import FileError, InputError, PolydemError, RunError
 from .evaluate import evaluate
 from .library import version
 from .namelist import write_namelist
+from .schema import schema
 from .simulation import Simulation, Snapshot
 
 __all__ = ["FileError", "InputError", "PolydemError", "RunError", "Simulation", "Snapshot", "evaluate",
-           "namelist", "version", "write_namelist"]
+           "namelist", "schema", "settings", "version", "write_namelist"]

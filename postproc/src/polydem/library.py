@@ -18,6 +18,10 @@ from .errors import BY_CODE, InputError, PolydemError
 #: Name of the file
 NAME = "libpolydem.so.0"
 
+#: Debian packages of the libraries that it may want
+PACKAGES = {"libgomp.so.1": "libgomp1", "libgfortran.so.5": "libgfortran5", "libhdf5_serial.so.103": "libhdf5-103-1",
+            "libhdf5_serial_fortran.so.102": "libhdf5-fortran-102"}
+
 #: Result and arguments of each function, after the error handle where it has one
 WITHOUT_ERROR: dict[str, tuple[Any, list[Any]]] = {
     "version": (c_long, [c_char_p, c_long]),
@@ -59,7 +63,13 @@ def find_library() -> Path:
 @cache
 def load() -> ctypes.CDLL:
     """The library, with the types of its functions."""
-    library = ctypes.CDLL(str(find_library()))
+    place = find_library()
+    try:
+        library = ctypes.CDLL(str(place))
+    except OSError as error:
+        missing = str(error).partition(":")[0]
+        where = f"; in Debian and Ubuntu it is in the package {PACKAGES[missing]}" if missing in PACKAGES else ""
+        raise PolydemError(f"{place} cannot be loaded: {error}{where}") from error
     for name, (result, arguments) in WITHOUT_ERROR.items():
         _declare(library, name, result, arguments)
     for name, (result, arguments) in WITH_ERROR.items():

@@ -36,7 +36,7 @@ def need(package: str, extra: str, purpose: str) -> Any:
         return importlib.import_module(package)
     except ImportError as error:
         raise ResultError(f"{purpose} needs the package {package}: install it with pip install {package}, or with "
-                          f"pip install 'polydem-post[{extra}]'") from error
+                          f"pip install 'polydem[{extra}]'") from error
 
 
 def insist_on_frames(run: Any) -> None:
