@@ -6,7 +6,7 @@ from typing import Any
 
 from ..base.polygons import area_of
 from ..read.frames import Frame
-from ..read.tables import need
+from ..base.optional import need
 from .windows import Window, area_inside, outline_of, shifts_into
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .tables import CONTACT_COLUMNS, need
+from ..base.optional import need
+from .tables import CONTACT_COLUMNS
 
 #: Columns of a node, and of an edge
 NODE_COLUMNS = ("position", "angle", "velocity", "angular_velocity", "mass", "fixed")
