@@ -39,8 +39,8 @@ def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], 
                   say: Callable[[str], None] | None = None) -> int:
     """Make a bodies file of the polygons of a file (WKT, GeoJSON, plain text); return the number of bodies.
 
-    Pictures and drawings (DXF, SVG) are traced with the choices of `tracing`, and `say` gets sentences on what was
-    found and what errors the simplification made. Grains of pictures are decomposed in any case.
+    Pictures and drawings (DXF, SVG) are traced with the choices of `tracing`, and `say` gets sentences on what
+    was found and what errors the simplification made. Grains of pictures are decomposed in any case.
 
     Coordinates are multiplied by `scale` to give metres, then `origin` is subtracted as in `write_bodies`. `fixed` are
     numbers of outlines in the file, from 1. A concave outline is an error, or with `decomposed` becomes a body of
@@ -60,8 +60,10 @@ def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], 
     if traced and say:
         for sentence in found.said:
             say(sentence)
-        say("pieces: {}; thickness of the thinnest: {:.3g} m, of the 10 % thinnest at most {:.3g} m; the time step "
-            "follows it".format(*_thin_pieces(output)))
+        body, thickness = _thicknesses(output)
+        thinnest = outlines[body[np.argmin(thickness)]].place.removeprefix(f"{path}: ")
+        say(f"pieces: {len(body)}; thickness of the thinnest: {thickness.min():.3g} m ({thinnest}), which the time "
+            f"step follows; of the 10 % thinnest at most {np.quantile(thickness, 0.1):.3g} m")
     return count
 
 
@@ -187,12 +189,6 @@ def pieces_of(path: str | os.PathLike[str]) -> tuple[int, int, float]:
     count = np.bincount(body)
     several = count[body] > 1
     return int((count > 1).sum()), int(count.max()), float(thickness[several].min(initial=np.inf))
-
-
-def _thin_pieces(path: str | os.PathLike[str]) -> tuple[int, float, float]:
-    """Number of pieces, thickness of the thinnest, and of the thickest of the 10 % that are thinnest [m]."""
-    _, thickness = _thicknesses(path)
-    return len(thickness), float(thickness.min()), float(np.quantile(thickness, 0.1))
 
 
 def _thicknesses(path: str | os.PathLike[str]) -> tuple[IntArray, FloatArray]:

@@ -138,7 +138,7 @@ def insist_on_simple(outline: FloatArray) -> None:
 def decompose(outline: FloatArray) -> list[FloatArray]:
     """Few and thick convex pieces of a simple outline with anticlockwise vertices; their areas add up to its area.
 
-    Triangles of ears that are cut off (Meisters, Amer. Math. Monthly 82 (1975) 648), and with shapely those of Delaunay,
+    Triangles of ears that are cut off (Meisters, Amer. Math. Monthly 82 (1975) 648), with shapely also of Delaunay,
     are merged as long as the result is convex (Hertel & Mehlhorn, LNCS 158 (1983) 207): at most four times as many
     pieces as needed. Of several orders the one with the greatest thickness over number is taken.
     """
@@ -171,9 +171,9 @@ def _delaunay(outline: FloatArray) -> list[list[int]]:
 
 
 def _merged(outline: FloatArray, triangles: list[list[int]], by_thickness: bool) -> list[list[int]]:
-    """Convex pieces of triangles: the thinnest is merged first, with the neighbour that makes the thickest piece of it.
+    """Convex pieces of triangles: the thinnest is merged first, with the neighbour that makes it thickest.
 
-    Without `by_thickness` the first is, with the first neighbour.
+    Without `by_thickness`: the first one, with its first neighbour.
 
     A diagonal that must stay between two pieces must stay when they have grown, too.
     """

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..read.frames import Frame
 from ..base.optional import need
+from ..read.frames import Frame
 from ..read.trajectory import Trajectory
 from .meshes import contact_data, finite, in_space
 

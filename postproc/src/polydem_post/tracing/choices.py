@@ -38,7 +38,7 @@ class Tracing:
             if value is not None and not 0.0 < value < float("inf"):
                 raise ResultError(f"--{name} is {value}, but must be a number above 0")
         if self.tolerance is not None and self.tolerance > 0.3:
-            raise ResultError(f"--tolerance is {self.tolerance}, but must be at most 0.3, a share of the size of a grain")
+            raise ResultError(f"--tolerance is {self.tolerance}, but must be at most 0.3, a share of a grain's size")
         if self.split is not None and self.split > 1.0:
             raise ResultError(f"--split is {self.split}, but must be at most 1, a share of the width of a grain")
         for name in ("dark", "smooth", "split"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from ..base.polygons import FloatArray, IntArray
 from .labels import Labels, skimage
@@ -35,19 +36,18 @@ def contours(labels: Labels) -> tuple[list[IntArray], list[FloatArray]]:
 def _places(twice: IntArray, labels: Labels) -> FloatArray:
     """Row and column of points, given as twice those of the middle between two pixels."""
     if labels.level is None:
-        return 0.5 * twice
+        return np.asarray(0.5 * twice, dtype=np.float64)
     one, two = tuple((twice // 2).T), tuple(((twice + 1) // 2).T)
     a, b = labels.level[one], labels.level[two]
     free = (labels.label[one] == 0) != (labels.label[two] == 0)
     moves = free & ((a > 0.0) != (b > 0.0)) & ~_at_saddle(twice, labels.label)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(moves, np.clip(a / (a - b), NEAREST, 1.0 - NEAREST), 0.5)
-    place: FloatArray = twice // 2 + share[:, None] * ((twice + 1) // 2 - twice // 2)
-    return place
+    return np.asarray(twice // 2 + share[:, None] * ((twice + 1) // 2 - twice // 2), dtype=np.float64)
 
 
-def _at_saddle(twice: IntArray, label: IntArray) -> np.ndarray:
-    """Whether a point is at a square of four pixels of which two opposite ones are of grains: there lines could cross."""
+def _at_saddle(twice: IntArray, label: IntArray) -> npt.NDArray[np.bool_]:
+    """Whether a point is at a square of pixels of which two opposite ones are of grains: there lines could cross."""
     inside = label > 0
     a, b, c, d = inside[:-1, :-1], inside[:-1, 1:], inside[1:, :-1], inside[1:, 1:]
     saddle = (a == d) & (b == c) & (a != b)

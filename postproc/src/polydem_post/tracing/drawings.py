@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as Xml
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,8 @@ def _read_dxf(path: Path) -> Drawing:
         document = ezdxf.readfile(path)
     except ezdxf.DXFError as error:
         raise ResultError(f"{path}: is not DXF that ezdxf reads ({error})") from error
-    lines, places = [], []
+    lines: list[Callable[[float], FloatArray]] = []
+    places = []
     left: dict[str, int] = {}
     for entity in _entities(document.modelspace()):
         kind = entity.dxftype()
@@ -67,7 +69,7 @@ def _read_dxf(path: Path) -> Drawing:
         if shape is None or not len(shape) or not _is_closed(_of_dxf(shape, None)):
             left[kind] = left.get(kind, 0) + 1
             continue
-        lines.append(lambda distance, shape=shape: _of_dxf(shape, distance))
+        lines.append(partial(_of_dxf, shape))
         places.append(f"{path}: {kind} {entity.dxf.handle}")
     unit = ezdxf.units.unit_name(document.units) if document.units else "not given"
     metres = ezdxf.units.conversion_factor(document.units, ezdxf.units.M) if document.units else None
@@ -101,7 +103,8 @@ def _read_svg(path: Path) -> Drawing:
     size = {name: root.attrib.pop(name, "") for name in ("width", "height", "viewBox")}
     top, metres = _sheet(size)
     text = StringIO(Xml.tostring(root, encoding="unicode"))
-    lines, places = [], []
+    lines: list[Callable[[float], FloatArray]] = []
+    places = []
     left: dict[str, int] = {}
     try:
         shapes = [each for each in elements.SVG.parse(text, reify=False).elements()
@@ -109,10 +112,10 @@ def _read_svg(path: Path) -> Drawing:
         for number, shape in enumerate(shapes, 1):
             whole = abs(elements.Path(shape))
             for segments in ([*each] for each in whole.as_subpaths()):
-                if not _is_closed(_of_svg(segments, None, top, elements)):
+                if not _is_closed(_of_svg(elements, segments, top, None)):
                     left[type(shape).__name__] = left.get(type(shape).__name__, 0) + 1
                     continue
-                lines.append(lambda distance, segments=segments: _of_svg(segments, distance, top, elements))
+                lines.append(partial(_of_svg, elements, segments, top))
                 places.append(f"{path}: {shape.id or f'{type(shape).__name__} {number}'}")
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ResultError(f"{path}: is not SVG that svgelements reads ({error})") from error
@@ -143,7 +146,7 @@ def _sheet(size: dict[str, str]) -> tuple[float, float | None]:
     return bottom, width / box[2] if width and box and box[2] else None
 
 
-def _of_svg(segments: list[Any], distance: float | None, bottom: float, elements: Any) -> FloatArray:
+def _of_svg(elements: Any, segments: list[Any], bottom: float, distance: float | None) -> FloatArray:
     """The points of a part of a path of svgelements."""
     points: list[tuple[float, float]] = []
     for segment in segments:

@@ -47,8 +47,8 @@ def read_labels(path: Path, choices: Tracing) -> Labels:
         label = _split(label, choices.split)
         said.append(f"grains after the cuts of narrow necks: {label.max()}, before: {before}")
     if level is None and label.max() > 0 and label.max() > 0.05 * label.size:
-        raise ResultError(f"{path}: has {label.max()} regions of one value on {label.size} pixels, so it is no labelled "
-                          "picture; give --threshold for a grey one")
+        raise ResultError(f"{path}: has {label.max()} regions of one value on {label.size} pixels, so it is no "
+                          "labelled picture; give --threshold for a grey one")
     label = _chosen(label, choices, said)
     if not label.any():
         raise ResultError(f"{path}: no grains are left: {'; '.join(said)}")
@@ -114,7 +114,8 @@ def _grey(path: Path, choices: Tracing) -> tuple[npt.NDArray[np.bool_], FloatArr
     level = (threshold - grey) if choices.dark else (grey - threshold)
     side = "darker" if choices.dark else "brighter"
     share = float((level > 0.0).mean())
-    return level > 0.0, level, [f"grains are {side} than the grey value {threshold:.4g}: {100 * share:.0f} % of the area"]
+    said = f"grains are {side} than the grey value {threshold:.4g}: {100 * share:.0f} % of the area"
+    return level > 0.0, level, [said]
 
 
 def _split(label: IntArray, share: float) -> IntArray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.optional import need
-from ..base.polygons import FloatArray, IntArray, area_of
+from ..base.polygons import FloatArray, IntArray, area_of, join, moments
 
 #: A grain whose simplified line makes no polygon, or one that meets another, gets half the tolerance, this many times
 TRIES = 12
@@ -39,7 +39,7 @@ def simplified(numbers: list[IntArray], places: list[FloatArray], tolerance: Flo
 
 
 def _solved(shapely: Any, places: list[FloatArray], tolerance: FloatArray, chains: list[Chain], parts: list[list[int]],
-            point: FloatArray) -> list[FloatArray]:
+            point: FloatArray, lone: list[bool]) -> list[FloatArray]:
     """The simplified outlines, with less tolerance where they fail."""
     own = np.array(tolerance, dtype=float)
     lines: list[Any] = [None] * len(chains)
@@ -50,7 +50,8 @@ def _solved(shapely: Any, places: list[FloatArray], tolerance: FloatArray, chain
             lines[k] = _line(shapely, chains[k], point, least)
         rings = [np.concatenate([_directed(chains[k], lines[k], grain)[:-1] for k in parts[grain]])
                  for grain in range(len(places))]
-        outlines = [point[ring] for ring in rings]
+        outlines = [_with_area(shapely, point[ring], places[grain], own[grain]) if lone[grain] else point[ring]
+                    for grain, ring in enumerate(rings)]
         bad = _failing(shapely, outlines)
         if not bad:
             break
@@ -60,8 +61,19 @@ def _solved(shapely: Any, places: list[FloatArray], tolerance: FloatArray, chain
     return outlines
 
 
-def _chains(numbers: list[IntArray], places: list[FloatArray]) -> tuple[list[Chain], list[list[int]], FloatArray]:
-    """All chains, those of each grain in their order, and the places of all points."""
+def _with_area(shapely: Any, outline: FloatArray, exact: FloatArray, tolerance: float) -> FloatArray:
+    """The outline of a grain that touches none, scaled to its area, if that is within the tolerance."""
+    if len(outline) < 3 or area_of(outline) <= 0.0 or tolerance <= 0.0:
+        return outline
+    centre = moments(*join([outline]))[1][0]
+    scaled: FloatArray = centre + np.sqrt(area_of(exact) / area_of(outline)) * (outline - centre)
+    distance = shapely.hausdorff_distance(shapely.LinearRing(scaled), shapely.LinearRing(exact))
+    return scaled if distance <= tolerance else outline
+
+
+def _chains(numbers: list[IntArray],
+            places: list[FloatArray]) -> tuple[list[Chain], list[list[int]], FloatArray, list[bool]]:
+    """All chains, those of each grain in their order, the places of all points, and which grains touch no other."""
     _, first, inverse = np.unique(np.concatenate(numbers), return_index=True, return_inverse=True)
     point = np.concatenate(places)[first]
     rings = np.split(inverse.ravel(), np.cumsum([len(each) for each in numbers])[:-1])
@@ -85,7 +97,7 @@ def _chains(numbers: list[IntArray], places: list[FloatArray]) -> tuple[list[Cha
                 chains.append(Chain(key, []))
             chains[known[key]].owners.append((grain, ahead))
             parts[-1].append(known[key])
-    return chains, parts, point
+    return chains, parts, point, [bool((degree[ring] == 2).all()) for ring in rings]
 
 
 def _nodes(ring: IntArray, degree: IntArray, point: FloatArray) -> IntArray:

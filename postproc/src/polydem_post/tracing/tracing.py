@@ -64,7 +64,7 @@ def _of_picture(path: Path, choices: Tracing, tolerance: float, scale: float) ->
             f"origin: lower left corner of the picture, y up; metres per pixel: {scale:g} (--scale)",
             *_errors(exact, lines, scale)]
     if tolerance * np.median(size) < 1.0:
-        said.append(f"--tolerance {tolerance:g} is less than a pixel for most grains, so steps of pixels remain as corners")
+        said.append(f"--tolerance {tolerance:g} is less than a pixel for most grains: steps of pixels stay as corners")
     return Traced([Outline(line, f"{path}: grain {k} at pixel ({x:.0f}, {y:.0f}) from the lower left")
                    for k, (line, (x, y)) in enumerate(zip(lines, (each.mean(axis=0) for each in exact)), 1)], said)
 
@@ -82,8 +82,8 @@ def _errors(exact: list[FloatArray], lines: list[FloatArray], scale: float) -> l
     words = [f"{name} {_percent(np.median(np.abs(each)))} (greatest {_percent(np.abs(each).max())})"
              for name, each in errors.items()]
     return [f"corners per grain, median: {np.median(corners[1]):.0f}, before: {np.median(corners[0]):.0f}",
-            f"errors by this, medians: {', '.join(words)}; greatest distance: {distance.max() * scale:.3g} m; all grains "
-            f"have {area_now.sum() / area.sum() - 1.0:+.2%} of area"]
+            f"errors by this, medians: {', '.join(words)}; greatest distance: {distance.max() * scale:.3g} m; all "
+            f"grains have {area_now.sum() / area.sum() - 1.0:+.2%} of area"]
 
 
 def _percent(value: Any) -> str:
