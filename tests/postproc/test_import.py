@@ -315,8 +315,8 @@ def features(*properties):
     ("a.txt", text([STAR[k] for k in (0, 4, 8, 2, 6)]), "its edges 1 and 3 cross"),
     ("a.txt", "0 0\n1 0\n1 1e999\n", "a coordinate is not a finite number"),
     ("a.xyz", "0 0", "its name does not say the format; give --from wkt, geojson, text"),
-    ("a.dxf", "0 0", "import reads polygons, wkt, geojson, text, but this is a drawing; convert it to WKT or GeoJSON"),
-    ("a.PNG", "0 0", "but this is a picture; trace its outlines (find_contours of scikit-image) and write"),
+    ("a.dwg", "0 0", "import reads polygons, wkt, geojson, text, but this is a drawing; convert it to WKT or GeoJSON"),
+    ("a.PDF", "0 0", "but this is a picture in a page; save it as PNG, which import traces"),
     ("a.stl", "0 0", "but this is a body in space; cut it"),
 ])
 def test_errors_name_the_place(tmp_path, capsys, name, content, message):

@@ -24,5 +24,5 @@ __all__ = ["Contacts", "Frame", "NoFrame", "NoManifest", "ResultError", "Setting
 __version__ = "0.1.0"
 
 #: The subpackages and modules, lowest first
-LAYERS = ("base", "outlines", "bodies_file", "read", "analysis", "pictures", "export", "sweep", "accuracy",
+LAYERS = ("base", "outlines", "tracing", "bodies_file", "read", "analysis", "pictures", "export", "sweep", "accuracy",
           "command_line", "manual")

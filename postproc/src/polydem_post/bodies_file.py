@@ -13,9 +13,10 @@ import numpy as np
 
 from .base.convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .base.new_file import NewHdf5, new_file
-from .base.polygons import FloatArray, IntArray, following, join, moments
+from .base.polygons import FloatArray, IntArray, join, thicknesses
 from .base.result_file import ResultError, cannot_write, reading_any
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
+from .tracing import FORMAT_OF_SUFFIX, Tracing, trace
 
 #: What becomes the origin of a bodies file: a point (x, y) [m], the centre of the polygons, or nothing
 Origin = Optional[Union[str, tuple[float, float]]]
@@ -34,8 +35,12 @@ INFINITE = {"mass": 0.0, "inertia": 0.0, "density": 2500.0}
 
 def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], *, form: str = "", scale: float = 1.0,
                   fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False,
-                  origin: Origin = None) -> int:
+                  origin: Origin = None, tracing: Tracing | None = None,
+                  say: Callable[[str], None] | None = None) -> int:
     """Make a bodies file of the polygons of a file (WKT, GeoJSON, plain text); return the number of bodies.
+
+    Pictures and drawings (DXF, SVG) are traced with the choices of `tracing`, and `say` gets sentences on what
+    was found and what errors the simplification made. Grains of pictures are decomposed in any case.
 
     Coordinates are multiplied by `scale` to give metres, then `origin` is subtracted as in `write_bodies`. `fixed` are
     numbers of outlines in the file, from 1. A concave outline is an error, or with `decomposed` becomes a body of
@@ -43,8 +48,23 @@ def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], 
     """
     if Path(output).exists() and Path(output).samefile(path):
         raise ResultError(f"{output}: is the file that is imported; choose another name")
-    return write_bodies(read_outlines(Path(path), form), output, scale=scale, fixed=fixed, decomposed=decomposed,
-                        overwrite=overwrite, origin=origin)
+    traced = "" if form else FORMAT_OF_SUFFIX.get(Path(path).suffix.lower(), "")
+    if traced:
+        found = trace(Path(path), tracing or Tracing(), scale)
+        outlines, decomposed = found.outlines, decomposed or traced == "picture"
+    else:
+        outlines = read_outlines(Path(path), form)
+        (tracing or Tracing()).insist_on(path, (), "polygons")
+    count = write_bodies(outlines, output, scale=scale, fixed=fixed, decomposed=decomposed, overwrite=overwrite,
+                         origin=origin)
+    if traced and say:
+        for sentence in found.said:
+            say(sentence)
+        body, thickness = _thicknesses(output)
+        thinnest = outlines[body[np.argmin(thickness)]].place.removeprefix(f"{path}: ")
+        say(f"pieces: {len(body)}; thickness of the thinnest: {thickness.min():.3g} m ({thinnest}), which the time "
+            f"step follows; of the 10 % thinnest at most {np.quantile(thickness, 0.1):.3g} m")
+    return count
 
 
 def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: Any) -> int:
@@ -165,21 +185,20 @@ def pieces_of(path: str | os.PathLike[str]) -> tuple[int, int, float]:
 
     The thickness is twice the smallest distance of an edge from the centroid.
     """
+    body, thickness = _thicknesses(path)
+    count = np.bincount(body)
+    several = count[body] > 1
+    return int((count > 1).sum()), int(count.max()), float(thickness[several].min(initial=np.inf))
+
+
+def _thicknesses(path: str | os.PathLike[str]) -> tuple[IntArray, FloatArray]:
+    """The body of each piece of a bodies file, from 0, and its thickness [m]."""
     with reading_any(Path(path)) as file:
         vertex, start = file["vertex"][:], file["vertex_start"][:]
         piece = file["piece"][:] if "piece" in file else np.zeros(len(vertex), dtype=np.int64)
-    count = np.maximum.reduceat(piece, start[:-1]) + 1
-    several = np.repeat(count > 1, np.diff(start))
-    if not several.any():
-        return 0, 1, float("inf")
-    body = np.repeat(np.arange(len(count)), np.diff(start))
-    begins = np.append(True, (np.diff(body) != 0) | (np.diff(piece) != 0))
-    ends = np.append(np.flatnonzero(begins[several]), several.sum())
-    corners = vertex[several]
-    _, centre, _ = moments(corners, ends)
-    edge, arm = corners[following(ends)] - corners, corners - np.repeat(centre, np.diff(ends), axis=0)
-    distance = np.abs(arm[:, 0] * edge[:, 1] - arm[:, 1] * edge[:, 0]) / np.hypot(edge[:, 0], edge[:, 1])
-    return int((count > 1).sum()), int(count.max()), 2.0 * float(distance.min())
+    body = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    begins = np.flatnonzero(np.append(True, (np.diff(body) != 0) | (np.diff(piece) != 0)))
+    return body[begins], thicknesses(vertex, np.append(begins, len(vertex)))
 
 
 def _shift(outlines: list[Outline], scale: float, origin: Origin) -> FloatArray:

@@ -19,10 +19,11 @@ PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inert
 
 #: Files that are no polygons, by the end of their name: what they are, and what makes polygons of them
 _DRAWING = "a drawing; convert it to WKT or GeoJSON (ogr2ogr, QGIS)"
-_PICTURE = "a picture; trace its outlines (find_contours of scikit-image) and write their vertices as text"
+_PICTURE = "a picture in a page; save it as PNG, which import traces"
+_TRACED = "to be traced; give it to the verb import or to import_bodies"
 _SOLID = "a body in space; cut it, and write the vertices of the cut as text"
-OTHER_FORMATS = {**dict.fromkeys((".dxf", ".dwg", ".svg", ".shp", ".kml", ".gpkg"), _DRAWING),
-                 **dict.fromkeys((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif", ".pdf"), _PICTURE),
+OTHER_FORMATS = {**dict.fromkeys((".dwg", ".shp", ".kml", ".gpkg"), _DRAWING), ".pdf": _PICTURE,
+                 **dict.fromkeys((".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif", ".dxf", ".svg"), _TRACED),
                  **dict.fromkeys((".stl", ".obj", ".ply", ".step", ".stp", ".iges"), _SOLID)}
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

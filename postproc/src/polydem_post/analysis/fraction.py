@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..base.optional import need
 from ..base.polygons import area_of
 from ..read.frames import Frame
-from ..read.tables import need
 from .windows import Window, area_inside, outline_of, shifts_into
 
 

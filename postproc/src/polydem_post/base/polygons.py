@@ -112,6 +112,15 @@ def moments(vertex: FloatArray, start: npt.NDArray[np.integer]) -> tuple[FloatAr
     return area, origin + centre, second
 
 
+def thicknesses(vertex: FloatArray, start: npt.NDArray[np.integer]) -> FloatArray:
+    """Thickness of each convex polygon [m]: twice the smallest distance of an edge from the centroid."""
+    _, centre, _ = moments(vertex, start)
+    edge, arm = vertex[following(start)] - vertex, vertex - np.repeat(centre, np.diff(start), axis=0)
+    distance = np.abs(arm[:, 0] * edge[:, 1] - arm[:, 1] * edge[:, 0]) / np.hypot(edge[:, 0], edge[:, 1])
+    thickness: FloatArray = 2.0 * np.minimum.reduceat(distance, np.asarray(start[:-1]))
+    return thickness
+
+
 def clip(outline: FloatArray, point: FloatArray, normal: FloatArray) -> FloatArray:
     """The part of a polygon on the inner side of a line, which passes through a point and has an outward normal.
 

@@ -14,10 +14,12 @@ from ..base.emit import FORMATS
 from ..base.result_file import ResultError
 from ..read.timing_table import timing_table
 from ..read.trajectory import Trajectory
-from .arguments import numbers
+from .arguments import numbers, say
 
 #: Frames between two messages of progress on a terminal
 EVERY = 10
+#: Necks that --split cuts, as a share of the width of the smaller grain
+SPLIT = 0.7
 
 
 def add_data_verbs(verbs: Any) -> None:
@@ -45,6 +47,13 @@ def add_data_verbs(verbs: Any) -> None:
     bodies.add_argument("--origin", type=_origin, metavar="ORIGIN")
     bodies.add_argument("--fixed", type=numbers, default=[], metavar="A,B,C")
     bodies.add_argument("--decompose", action="store_true")
+    bodies.add_argument("--tolerance", type=float, metavar="T")
+    bodies.add_argument("--threshold", type=_threshold, metavar="GREY")
+    bodies.add_argument("--dark", action="store_true", default=None)
+    bodies.add_argument("--smooth", type=float, metavar="PIXELS")
+    bodies.add_argument("--split", type=float, nargs="?", const=SPLIT, metavar="SHARE")
+    bodies.add_argument("--least", type=float, metavar="PIXELS")
+    bodies.add_argument("--border", action="store_true", default=None)
     bodies.add_argument("--force", action="store_true")
 
 
@@ -64,6 +73,14 @@ def _origin(text: str) -> str | tuple[float, float]:
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"'{text}' is neither centre nor like 500000,5400000") from error
     return x, y
+
+
+def _threshold(text: str) -> str | float:
+    """The word otsu, or a grey value."""
+    try:
+        return text if text == "otsu" else float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither otsu nor a grey value like 128") from error
 
 
 def _table(options: argparse.Namespace) -> None:
@@ -89,11 +106,15 @@ def _progress(done: int, total: int) -> None:
 
 def _import(options: argparse.Namespace) -> None:
     from ..bodies_file import import_bodies, origin_of, pieces_of
+    from ..tracing import Tracing
 
     if not np.isfinite(options.scale):
         raise ResultError("--scale takes a number above 0")
+    tracing = Tracing(options.tolerance, options.threshold, options.dark, options.smooth, options.split, options.least,
+                      options.border)
     n = import_bodies(options.file, options.output, form=options.form or "", scale=options.scale, fixed=options.fixed,
-                      decomposed=options.decompose, overwrite=options.force, origin=options.origin)
+                      decomposed=options.decompose, overwrite=options.force, origin=options.origin, tracing=tracing,
+                      say=lambda sentence: say(f"{options.file}: {sentence}"))
     if options.origin is not None:
         x, y = origin_of(options.output)
         print(f"{options.output}: its origin is at ({x!r}, {y!r}) m; export adds this to the coordinates")

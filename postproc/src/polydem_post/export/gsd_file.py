@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.optional import need
 from ..read.frames import Frame
-from ..read.tables import need
 from ..read.trajectory import Trajectory
 from .meshes import contact_data, finite, in_space
 

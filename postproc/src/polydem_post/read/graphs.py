@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .tables import CONTACT_COLUMNS, need
+from ..base.optional import need
+from .tables import CONTACT_COLUMNS
 
 #: Columns of a node, and of an edge
 NODE_COLUMNS = ("position", "angle", "velocity", "angular_velocity", "mass", "fixed")
@@ -35,7 +36,7 @@ def freud_system(frame: Any) -> Any:
     The box is the periodic cell, tilted by its shear. In the plane, and along an axis without period, it is three times
     as long as the bodies reach, so that no copies are near.
     """
-    freud = need("freud", "freud", "to_freud()")
+    freud = need("freud", "freud", "to_freud()", "freud-analysis")
     free = np.flatnonzero(frame.free)
     points = frame.position[free]
     low, high = points.min(axis=0), points.max(axis=0)

@@ -5,13 +5,13 @@ Contacts, frames and trajectories import this module, so their types are not nam
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..base.columns import columns_of
+from ..base.optional import need
 from ..base.result_file import ResultError
 
 #: Why a column of all frames cannot be one array, and what to do
@@ -28,15 +28,6 @@ MOVING_COLUMNS = ("position", "angle", "velocity", "angular_velocity")
 #: Columns of contacts in tables
 CONTACT_COLUMNS = ("first", "second", "first_index", "second_index", "area", "depth", "point", "normal", "length",
                    "force", "couple", "normal_force", "tangential_force", "branch", "with_fixed")
-
-
-def need(package: str, extra: str, purpose: str) -> Any:
-    """An optional package; the error names it and the command that installs it."""
-    try:
-        return importlib.import_module(package)
-    except ImportError as error:
-        raise ResultError(f"{purpose} needs the package {package}: install it with pip install {package}, or with "
-                          f"pip install 'polydem[{extra}]'") from error
 
 
 def insist_on_frames(run: Any) -> None:
