@@ -258,7 +258,7 @@ with polydem.Simulation(scene, {"checkpoint.steps": 150, "checkpoint.wall_interv
         if k == kill:
             os.kill(os.getpid(), signal.SIGKILL)
     sim.run()
-    open(sys.argv[7], "w").write(sim.actions)
+    sim.save_actions(sys.argv[7])
     print(sim.state_hash)
 """
 
@@ -335,7 +335,7 @@ def test_a_state_has_its_actions():
         sim.drag = 3.0
         sim.run(100)
         sim.restore(state)
-        assert len(sim.actions.splitlines()) == 2
+        assert len(sim.actions) == 2
         sim.run(200)
         copy.run(200)
         assert copy.state_hash == sim.state_hash
@@ -357,9 +357,9 @@ BAD = [
     (lambda s: s._handle.act("gravity", values=[1]), "1 values, not 2"),
     (lambda s: s._handle.act("gravitate", values=[1]), "no action \"gravitate\"; did you mean 'gravity'"),
     (lambda s: setattr(s, "gravity", (1, 2, 3)), "2 numbers"),
-    (lambda s: setattr(s, "drag", -1.0), "not negative"),
+    (lambda s: setattr(s, "drag", -1.0), "must be >= 0, not -1"),
     (lambda s: setattr(s, "drag", 1e9), "more than a tenth"),
-    (lambda s: setattr(s, "friction_scale", -1.0), "not negative"),
+    (lambda s: setattr(s, "friction_scale", -1.0), "must be >= 0, not -1"),
     (lambda s: s.bodies.apply_force([99], (1, 0)), "no body 99"),
     (lambda s: s.bodies.apply_force([3], (1, 0)), "body 3 is fixed"),
     (lambda s: s.bodies.apply_force([1, 1], (1, 0)), "body 1 is given twice"),
@@ -370,14 +370,18 @@ BAD = [
     (lambda s: s.add([SQUARE * 0 + (1, 1)]), "body"),
     (lambda s: s.add([SQUARE[[0, 2, 1, 3]] + (1, 1)]), "convex|itself|cross"),
     (lambda s: s.add([SQUARE[:2]]), "three corners"),
-    (lambda s: s.add([[1, 2, 3]]), "outline"),
-    (lambda s: s.add([square(0, -0.61)]), "overlaps the body 3"),
+    (lambda s: s.add([[1, 2, 3]]), "are a list"),
+    (lambda s: s.add([square(0, -0.61)]), "overlaps the body 3 of the wall floor"),
     (lambda s: s.add([square(1, 1), square(1.005, 1)]), "overlaps body"),
     (lambda s: s.add([square(1, 1)], material="glass"), "no material \"glass\""),
-    (lambda s: s.add([square(1, 1)], density=-1), "not negative"),
+    (lambda s: s.add([square(1, 1)], density=-1), "must be >= 0, not -1"),
     (lambda s: s.add([square(np.nan, 1)]), "not finite"),
     (lambda s: s.remove([4]), "body 4 is fixed"),
     (lambda s: s.remove([77]), "no body 77"),
+    (lambda s: s.walls["roof"], "no wall 'roof'; there are floor, lid"),
+    (lambda s: s.loads["press"], "no load 'press'"),
+    (lambda s: s.energy["kinetik"], "no term of the balance 'kinetik'; there are kinetic"),
+    (lambda s: s.add([square(1, 1)], material=1), "a material is a name"),
 ]
 
 
@@ -388,10 +392,30 @@ def test_a_wrong_action_is_an_exception_before_anything_changes(k):
         sim.run(3)
         with pytest.raises(polydem.InputError, match=message):
             act(sim)
-        assert sim.actions == ""
+        assert sim.actions == []
         sim.run(20)
         other.run(23)
         assert sim.state_hash == other.state_hash
+
+
+def test_a_slip_of_the_pen_is_an_error(free):
+    for thing, name in ((free, "fricton_scale"), (free.walls["floor"], "velocty"), (free.bodies, "colour")):
+        with pytest.raises(AttributeError, match=f"no attribute {name}"):
+            setattr(thing, name, 1)
+    for thing, name in ((free, "time"), (free.bodies, "position"), (free.walls["floor"], "force")):
+        with pytest.raises(AttributeError, match="read, but not set"):
+            setattr(thing, name, 1)
+
+
+def test_an_observer_may_act_after_the_last_step():
+    with polydem.Simulation(FREE, {"integrate.duration": 0.01}) as sim:
+        @sim.every(steps=20)
+        def act(sim):
+            sim.gravity = (0, -1)
+
+        sim.run()
+        assert sim.is_over
+        assert [line.split()[0] for line in sim.actions] == ["20", "40", "60", "80"]
 
 
 def test_bodies_do_not_leave_unless_the_run_expects_it(free):

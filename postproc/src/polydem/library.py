@@ -128,6 +128,8 @@ class Handle:
 
     def __init__(self, pointer: int):
         self.pointer: c_void_p | None = c_void_p(pointer)
+        #: Whether observers are called: after the last step their actions have no effect, since no step follows
+        self.observed = False
 
     @property
     def open(self) -> c_void_p:
@@ -165,6 +167,8 @@ class Handle:
         """Record an action, which takes effect at the begin of the next step."""
         ids = np.ascontiguousarray(np.asarray(bodies, dtype=np.int64).ravel())
         numbers = np.ascontiguousarray(np.asarray(values, dtype=np.float64).ravel())
+        if self.observed and self.integer("is_over") == 1:
+            return
         call("act", self.open, kind.encode(), name.encode(), ids.size, c_void_p(ids.ctypes.data), numbers.size,
              c_void_p(numbers.ctypes.data))
 

@@ -34,7 +34,31 @@ CONTACT_COLUMNS = ("first", "second", "area", "point", "normal", "length", "forc
 Observer = Callable[["Simulation"], Any]
 
 
-class Columns:
+class Named(dict[str, Any]):
+    """Values by name; a wrong name is an error that lists the others."""
+
+    def __init__(self, what: str, values: Mapping[str, Any]):
+        super().__init__(values)
+        self._what = what
+
+    def __missing__(self, name: str) -> Any:
+        raise InputError(f"there is no {self._what} {name!r}" + (f"; there are {', '.join(self)}" if self else ""))
+
+
+class Strict:
+    """An object to which no new attributes can be given from outside: a slip of the pen is an error."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        known = getattr(type(self), name, None)
+        if name.startswith("_") or (isinstance(known, property) and known.fset is not None):
+            super().__setattr__(name, value)
+        elif isinstance(known, property) or name in getattr(self, "_names", ()):
+            raise AttributeError(f"{name} can be read, but not set")
+        else:
+            raise AttributeError(f"{type(self).__name__} has no attribute {name}")
+
+
+class Columns(Strict):
     """Columns of bodies or contacts, in ascending order of identifiers; each is copied when it is asked for."""
 
     def __init__(self, simulation: Simulation, group: str, names: tuple[str, ...]):
@@ -75,11 +99,21 @@ class Bodies(Columns):
             self._simulation._handle.act("force", bodies=which, values=values)
 
 
-class Wall:
+class Wall(Strict):
     """A group &wall: its bodies, and the force and torque on it."""
 
     def __init__(self, simulation: Simulation, name: str, ids: npt.NDArray[np.int64]):
-        self._simulation, self.name, self.id = simulation, name, ids
+        self._simulation, self._name, self._id = simulation, name, ids
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._name
+
+    @property
+    def id(self) -> npt.NDArray[np.int64]:
+        """Identifiers of its bodies."""
+        return self._id
 
     def _rows(self) -> npt.NDArray[np.intp]:
         return np.searchsorted(self._simulation.bodies.id, self.id)
@@ -115,11 +149,16 @@ class Wall:
             *_numbers(velocity, 2, "a velocity"), float(spin), *_numbers(place, 2, "a pivot")])
 
 
-class Load:
+class Load(Strict):
     """A group &load: what it does, and its force."""
 
     def __init__(self, simulation: Simulation, name: str, number: int):
-        self._simulation, self.name, self._number = simulation, name, number
+        self._simulation, self._name, self._number = simulation, name, number
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._name
 
     def _value(self, k: int) -> float:
         values = self._simulation._handle.array("loads/value")
@@ -165,7 +204,7 @@ class Snapshot:
             load().polydem_delete_snapshot(byref(self._pointer))
 
 
-class Simulation:
+class Simulation(Strict):
     """A simulation in this process.
 
         source     path of a namelist, its text, or a dictionary {"forces": {"gravity": (0, -9.81)}, ...}
@@ -265,9 +304,13 @@ class Simulation:
         for interval, _ in self._observers:
             end = min(end, (now // interval + 1) * interval)
         done = int(call("advance", self._handle.open, end - now, PATIENCE))
-        for interval, observer in list(self._observers):
-            if done > 0 and (now + done) % interval == 0:
-                observer(self)
+        self._handle.observed = True
+        try:
+            for interval, observer in list(self._observers):
+                if done > 0 and (now + done) % interval == 0:
+                    observer(self)
+        finally:
+            self._handle.observed = False
         return done
 
     def every(self, steps: int | None = None, *, seconds: float | None = None) -> Callable[[Observer], Observer]:
@@ -344,7 +387,8 @@ class Simulation:
     def energy(self) -> dict[str, float]:
         """The energy and momentum balance of this step by name [J/m, N s/m, N s]; empty if it is switched off."""
         values = self._handle.array("energy/value")
-        return {} if values is None else dict(zip(self._names("energy"), map(float, values)))
+        found = {} if values is None else dict(zip(self._labels("energy"), map(float, values)))
+        return Named("term of the balance", found)
 
     @property
     def series(self) -> dict[str, npt.NDArray[Any]]:
@@ -354,9 +398,9 @@ class Simulation:
         if step is None or time is None or values is None:
             return {}
         values = values.reshape(len(step), -1)
-        return {"step": step, "time": time, **dict(zip(self._names("series"), values.T))}
+        return {"step": step, "time": time, **dict(zip(self._labels("series"), values.T))}
 
-    def _names(self, table: str) -> list[str]:
+    def _labels(self, table: str) -> list[str]:
         return [line.split("\t")[0] for line in self._handle.text(table).splitlines()]
 
     @property
@@ -372,13 +416,14 @@ class Simulation:
     @property
     def walls(self) -> Mapping[str, Wall]:
         """The walls by name."""
-        return MappingProxyType({name: Wall(self, name, ids) for name, ids in _walls(self._handle.text("walls"))})
+        walls = _walls(self._handle.text("walls"))
+        return MappingProxyType(Named("wall", {name: Wall(self, name, ids) for name, ids in walls}))
 
     @property
     def loads(self) -> Mapping[str, Load]:
         """The loads by name."""
-        return MappingProxyType({name: Load(self, name, k)
-                                 for k, name in enumerate(self._handle.text("loads").splitlines())})
+        names = self._handle.text("loads").splitlines()
+        return MappingProxyType(Named("load", {name: Load(self, name, k) for k, name in enumerate(names)}))
 
     @property
     def gravity(self) -> tuple[float, float]:
@@ -418,7 +463,9 @@ class Simulation:
         bodies = [np.asarray(outline, dtype=float) for outline in outlines]
         for outline in bodies:
             if outline.ndim != 2 or outline.shape[1] != 2:
-                raise InputError(f"an outline is (corners, 2) numbers, not {outline.shape}")
+                raise InputError(f"outlines are a list, each of (corners, 2) numbers; one has {outline.shape}")
+        if not isinstance(material, str):
+            raise InputError(f"a material is a name, not {material!r}")
         n = len(bodies)
         velocities = np.broadcast_to(np.asarray(velocity, dtype=float), (n, 2))
         spins = np.broadcast_to(np.asarray(angular_velocity, dtype=float), (n,))
@@ -444,9 +491,14 @@ class Simulation:
         self._handle.act("end_run")
 
     @property
-    def actions(self) -> str:
-        """All actions so far, a line each: in a file, `polydem run --actions FILE` repeats the run to the same bits."""
-        return self._handle.text("actions")
+    def actions(self) -> list[str]:
+        """All actions so far, a line each."""
+        return self._handle.text("actions").splitlines()
+
+    def save_actions(self, path: str | PathLike[str]) -> None:
+        """Write all actions so far to a file: `polydem run --actions FILE` repeats the run to the same bits."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.writelines(f"{line}\n" for line in self.actions)
 
     def frame(self) -> Any:
         """The present state as a `polydem_post` frame, for every measure and picture."""

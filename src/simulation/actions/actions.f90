@@ -167,7 +167,7 @@ contains
       else if (any(id < 1_lp .or. id > int(huge(1_ip), lp))) then
          call raise(error, input_error, kind//': an identifier is a whole number from 1, not '//to_text(minval(id)))
       else if (.not. all(abs(value) <= huge(1.0_wp))) then
-         call raise(error, input_error, kind//': a value is not finite')
+         call raise(error, input_error, trim(kind//' '//name)//': a value is not finite')
       end if
       if (.not. allocated(error)) action%id = int(id, ip)
    end subroutine new_action

@@ -125,11 +125,9 @@ contains
          call raise(error, input_error, 'its values are density, then velocity, angular velocity and corners of '// &
                     'each body')
       else if (action%value(1) < 0.0_wp) then
-         call raise(error, input_error, 'a density is not negative')
+         call raise(error, input_error, 'the density must be >= 0, not '//to_text(action%value(1)))
       else if (action%name /= '-' .and. material_number(self%settings, action%name) == 0_ip) then
          call raise(error, input_error, 'there is no material "'//action%name//'"')
-      else if (action%name == '-' .and. size(self%settings%material) > 0 .and. self%settings%scene%material == '') then
-         call raise(error, input_error, 'a body of this run needs a material')
       end if
       if (allocated(error)) return
       list%has_materials = size(self%settings%material) > 0
@@ -184,8 +182,12 @@ contains
 
       !> Name the body that is in the way.
       subroutine refuse()
+         character(len=:), allocatable :: owner
+
+         owner = ''
+         if (self%walls%wall_of(s) > 0_ip) owner = ' of the wall '//self%walls%wall(self%walls%wall_of(s))%name
          call raise(error, input_error, 'body '//to_text(k)//' of those that are added overlaps the body '// &
-                    to_text(self%bodies%id(s)))
+                    to_text(self%bodies%id(s))//owner)
       end subroutine refuse
 
       !> Whether the body overlaps another one

@@ -150,11 +150,12 @@ contains
          case (wall_load)
             call check_load(self, action%name, error)
          case (drag)
-            if (value(1) < 0.0_wp) call raise(error, input_error, 'a drag is not negative')
+            if (value(1) < 0.0_wp) call raise(error, input_error, 'the drag must be >= 0, not '//to_text(value(1)))
             if (value(1)*self%dt > greatest_change) call raise(error, input_error, 'with dt = '//to_text(self%dt)// &
                ' s a drag of '//to_text(value(1))//' 1/s changes a velocity by more than a tenth in a step')
          case (friction)
-            if (value(1) < 0.0_wp) call raise(error, input_error, 'a factor of the friction is not negative')
+            if (value(1) < 0.0_wp) call raise(error, input_error, 'the factor of the friction must be >= 0, not '// &
+                                              to_text(value(1)))
          case (force)
             call check_bodies(self, action%id, error)
          case (add_bodies)
