@@ -182,12 +182,7 @@ contains
 
       !> Name the body that is in the way.
       subroutine refuse()
-         character(len=:), allocatable :: owner
-
-         owner = ''
-         if (self%walls%wall_of(s) > 0_ip) owner = ' of the wall '//self%walls%wall(self%walls%wall_of(s))%name
-         call raise(error, input_error, 'body '//to_text(k)//' of those that are added overlaps the body '// &
-                    to_text(self%bodies%id(s))//owner)
+         call raise(error, input_error, 'body '//to_text(k)//' of those that are added overlaps '//name_of(self, s))
       end subroutine refuse
 
       !> Whether the body overlaps another one
@@ -211,6 +206,19 @@ contains
       end function overlap
 
    end subroutine find_room
+
+   !> Name of a body in a message: 'the body 3 of the wall floor'
+   pure function name_of(self, s) result(text)
+      type(simulation_t), intent(in) :: self
+      !> Its slot
+      integer(ip), intent(in) :: s
+      character(len=:), allocatable :: text
+      integer(ip) :: wall
+
+      text = 'the body '//to_text(self%bodies%id(s))
+      wall = self%walls%wall_of(s)
+      if (wall > 0_ip) text = text//' of the wall '//self%walls%wall(wall)%name
+   end function name_of
 
    !> Whether two convex polygons overlap: no edge of either separates them.
    pure logical function are_joined(first, second, offset)
