@@ -5,12 +5,12 @@
 !> completed, because the program was killed, is no action.
 module polydem_action_record
    use polydem_actions, only: action_t, actions_t, add_bodies, line_of, read_action, remove_bodies
+   use polydem_choose_methods, only: allow_exchange
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists, is_folder, rename_file, sync_file
    use polydem_folders, only: read_bytes
    use polydem_kinds, only: ip, lp
    use polydem_line_writer, only: line_writer_t
-   use polydem_participants, only: allow_exchange
    use polydem_result_files, only: actions_name, unfinished
    use polydem_run, only: run_t
    use polydem_strings, only: counted, to_text

@@ -1,11 +1,9 @@
 !> The participants of the steps of a run: the list of all kinds, and the calls of all that a run has.
 module polydem_participants
-   use polydem_changed_bodies, only: expect_changes
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_loaded_walls, only: loaded_walls_t
    use polydem_moving_cell, only: moving_cell_t
-   use polydem_new_sources_and_sinks, only: start_sources_and_sinks
    use polydem_recorded_walls, only: recorded_walls_t
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_item_t, participant_t, simulation_t
@@ -14,7 +12,7 @@ module polydem_participants
    use polydem_wall_removal, only: wall_removal_t
    implicit none
    private
-   public :: choose_participants, allow_exchange, start_participants, change_bodies, begin_step, need_table, &
+   public :: choose_participants, start_participants, change_bodies, begin_step, need_table, &
       check_contacts, need_all_ranks, follow_forces, end_step, serialize_participants
 
 contains
@@ -52,17 +50,6 @@ contains
       end subroutine add
 
    end subroutine choose_participants
-
-   !> Let bodies enter and leave by actions, in a run without sources and sinks.
-   subroutine allow_exchange(self)
-      !> The simulation at time 0
-      type(simulation_t), intent(inout) :: self
-
-      if (allocated(self%sources_and_sinks)) return
-      call start_sources_and_sinks(0, 0, self%sources_and_sinks)
-      call expect_changes(self%energy_balance)
-      call choose_participants(self)
-   end subroutine allow_exchange
 
    !> Start with the forces at time 0, or at the time of a restart. Collective.
    subroutine start_participants(self)

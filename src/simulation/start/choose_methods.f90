@@ -1,6 +1,7 @@
 !> Makes what the settings name: the only module of this layer that uses the factories.
 module polydem_choose_methods
    use polydem_body_forces, only: body_forces_t, choose_body_forces
+   use polydem_changed_bodies, only: expect_changes
    use polydem_errors, only: error_t
    use polydem_guard_list, only: choose_guards
    use polydem_integrator_factory, only: new_integrator
@@ -11,10 +12,10 @@ module polydem_choose_methods
    use polydem_participants, only: choose_participants
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_new_sources_and_sinks, only: new_sources_and_sinks
+   use polydem_new_sources_and_sinks, only: new_sources_and_sinks, start_sources_and_sinks
    implicit none
    private
-   public :: choose_methods
+   public :: choose_methods, allow_exchange
 
 contains
 
@@ -56,5 +57,16 @@ contains
       end do
       call choose_body_forces(strongest, body_forces)
    end subroutine choose_all_fields
+
+   !> Let bodies enter and leave by actions, in a run without sources and sinks.
+   subroutine allow_exchange(self)
+      !> The simulation at time 0
+      type(simulation_t), intent(inout) :: self
+
+      if (allocated(self%sources_and_sinks)) return
+      call start_sources_and_sinks(0, 0, self%sources_and_sinks)
+      call expect_changes(self%energy_balance)
+      call choose_participants(self)
+   end subroutine allow_exchange
 
 end module polydem_choose_methods
