@@ -16,11 +16,7 @@ contains
       type(force_sums_t), intent(inout) :: sums
 
       sums%are_in_bodies = .false.
-      if (allocated(sums%field)) then
-         if (size(sums%field, 2) == n) return
-         deallocate (sums%field)
-      end if
-      allocate (sums%field(3, n), source=0.0_wp)
+      call reserve(n, sums%field)
    end subroutine reserve_field
 
    !> Make room for the part of these forces that actions give to n bodies. New ones are zero.
@@ -29,12 +25,22 @@ contains
       integer(ip), intent(in) :: n
       type(force_sums_t), intent(inout) :: sums
 
-      if (allocated(sums%given)) then
-         if (size(sums%given, 2) == n) return
-         deallocate (sums%given)
-      end if
-      allocate (sums%given(3, n), source=0.0_wp)
+      call reserve(n, sums%given)
    end subroutine reserve_given
+
+   !> Allocate forces on n bodies with zeros, unless there are as many.
+   subroutine reserve(n, forces)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> The forces, (3, n)
+      real(wp), allocatable, intent(inout) :: forces(:, :)
+
+      if (allocated(forces)) then
+         if (size(forces, 2) == n) return
+         deallocate (forces)
+      end if
+      allocate (forces(3, n), source=0.0_wp)
+   end subroutine reserve
 
    !> Add the forces on some bodies that are no contacts to their sums, among the normal forces that are not elastic.
    !> Several threads may call it for different bodies.

@@ -325,6 +325,20 @@ def test_a_run_with_a_file_of_actions_goes_on_after_a_kill(tmp_path, kill):
     assert "leave out --actions" in refused.stderr
 
 
+def test_a_run_that_is_killed_before_its_first_checkpoint_keeps_its_actions(tmp_path):
+    scene, actions = ROOT / "inputs/first.nml", tmp_path / "actions.txt"
+    expected = run_script(scene, None, actions)
+    command = [PROGRAM, "run", str(scene), "--set", f"output.folder={tmp_path / 'r'}", "--threads", "1"]
+    run = subprocess.Popen([*command, "--actions", str(actions)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while run.poll() is None and not list((tmp_path / "r").glob("trajectory_*")):
+        pass
+    run.kill()
+    run.wait()
+    assert not list((tmp_path / "r").glob("checkpoint_*"))
+    subprocess.run([*command, "--continue"], check=True, capture_output=True)
+    assert Trajectory(tmp_path / "r").state_hash == expected
+
+
 def test_a_state_has_its_actions():
     with polydem.Simulation(ROOT / "inputs/first.nml") as sim:
         sim.gravity = (0, -5)

@@ -6,8 +6,8 @@ module polydem_claim_folder
    use polydem_kinds, only: ip
    use polydem_manifest, only: longest_name, manifest_t
    use polydem_table_file, only: table_path
-   use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
-      series_name, steps_name, trace_name
+   use polydem_result_files, only: actions_name, checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, &
+      profile_name, series_name, steps_name, trace_name
    use polydem_set_aside, only: set_aside
    use polydem_settings, only: output_settings_t, settings_t
    implicit none
@@ -75,6 +75,8 @@ contains
             call manifest%add_file(trim(names(k)), error)
          end do
          do k = 1, merge(0, manifest%n, is_restart)
+            ! A run that begins anew after a kill has its actions from there only.
+            if (manifest%entry(k)%name == actions_name) cycle
             if (manifest%entry(k)%name /= lock_name .and. .not. allocated(error)) &
                call manifest%remove_file(trim(manifest%entry(k)%name), error)
          end do
