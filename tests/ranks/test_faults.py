@@ -114,7 +114,9 @@ def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole
             shutil.rmtree(folder)
             continue
         kills += 1
-        assert process.returncode == 128 + signal.SIGKILL and message != "", (process.returncode, message)
+        # An mpirun that hangs after its ranks have died, having said so, is killed itself (src/packaging/watch_ranks).
+        codes = (128 + signal.SIGKILL, -signal.SIGKILL)
+        assert process.returncode in codes and "signal 9" in message, (process.returncode, message)
         after = segments(folder)
         assert all(after.get(name) == content for name, content in before.items()), f"kill {kills} lost a segment"
         if kills % 5 == 0 or kills == wanted:
