@@ -2,9 +2,9 @@
 module polydem_library_values
    use, intrinsic :: iso_c_binding, only: c_double, c_f_pointer, c_int, c_int64_t, c_long, c_ptr
    use polydem_actions, only: text_of
+   use polydem_added_and_removed, only: number_added
    use polydem_arrays, only: find_array
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_exchanged_bodies, only: number_added
    use polydem_global_hash, only: hash_all_bodies
    use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, give_text, leave, simulation_handle_t
    use polydem_hash, only: hexadecimal

@@ -10,11 +10,11 @@ module polydem_start_state
    use polydem_changed_bodies, only: change_accelerations
    use polydem_checkpoint_fields, only: read_pairs
    use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_enter_and_leave, only: find_leaving
    use polydem_enter_cell, only: join_copies
    use polydem_errors, only: error_t
-   use polydem_exchange_bodies, only: find_leaving
-   use polydem_removed_bodies, only: rows_of
    use polydem_kinds, only: ip, lp
+   use polydem_removed_bodies, only: rows_of
    use polydem_replace_bodies, only: rebuild_bodies
    use polydem_simulation, only: simulation_t
    use polydem_start_origin, only: blame, find_origin, origin_t

@@ -2,11 +2,11 @@
 module polydem_perform_actions
    use polydem_actions, only: action_t, add_bodies, drag, end_stage, force, friction, gravity, remove_bodies, &
       wall_load, wall_velocity
+   use polydem_added_and_removed, only: check_addition, removed_after
    use polydem_begin_stage, only: find_last_steps, use_parameters
    use polydem_changed_gravity, only: change_gravity
    use polydem_choose_step, only: greatest_change
    use polydem_errors, only: error_t, input_error, raise, run_error
-   use polydem_exchanged_bodies, only: check_addition, removed_after
    use polydem_give_velocity, only: give_velocity
    use polydem_kinds, only: ip, lp, wp
    use polydem_local_data, only: list_moving

@@ -1,5 +1,6 @@
 !> The participants of the steps of a run: the list of all kinds, and the calls of all that a run has.
 module polydem_participants
+   use polydem_entering_and_leaving, only: entering_and_leaving_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_loaded_walls, only: loaded_walls_t
@@ -7,7 +8,6 @@ module polydem_participants
    use polydem_recorded_walls, only: recorded_walls_t
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: participant_item_t, participant_t, simulation_t
-   use polydem_body_exchange, only: body_exchange_t
    use polydem_undirected_contacts, only: undirected_contacts_t
    use polydem_wall_removal, only: wall_removal_t
    implicit none
@@ -25,7 +25,7 @@ contains
 
       allocate (list(0))
       if (self%walls%has_gates()) call add(wall_removal_t())
-      if (allocated(self%sources_and_sinks)) call add(body_exchange_t())
+      if (allocated(self%sources_and_sinks)) call add(entering_and_leaving_t())
       if (self%bodies%cell%is_sheared .or. allocated(self%bodies%cell%load)) &
          call add(moving_cell_t(needs_all_ranks=allocated(self%bodies%cell%load)))
       if (allocated(self%walls%loads)) call add(loaded_walls_t(needs_all_ranks=.true.))

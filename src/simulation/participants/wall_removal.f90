@@ -7,10 +7,10 @@
 !> The elastic energy of the contacts with such a wall leaves with it. The energy balance takes it from its start, so
 !> that no work of the elastic forces appears.
 module polydem_wall_removal
+   use polydem_enter_and_leave, only: find_leaving
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
-   use polydem_exchange_bodies, only: find_leaving
    use polydem_force_sums, only: sum_energy
    use polydem_kinds, only: ip, wp
    use polydem_replace_bodies, only: hold_history, rebuild_bodies

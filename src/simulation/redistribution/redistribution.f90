@@ -12,10 +12,10 @@ module polydem_redistribution
    use polydem_contact_history, only: contact_history_t
    use polydem_domain, only: domain_t
    use polydem_errors, only: error_t
-   use polydem_motion_tests, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_data, only: rebuild_local_data
+   use polydem_motion_tests, only: greatest_displacement
    use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, copy_packed, join_packed
    use polydem_packed_history, only: pack_pairs, packed_history_t, receive_pairs, send_pairs, slots_of_pair
    use polydem_packed_state, only: join_state, pack_state, packed_state_t, send_state, unpack_state

@@ -1,6 +1,6 @@
 !> Bodies that actions add and remove. They enter and leave with those of sources and sinks, at the begin of the next
 !> step; a checkpoint and the balance treat them alike.
-module polydem_exchanged_bodies
+module polydem_added_and_removed
    use polydem_actions, only: action_t, actions_t, add_bodies, remove_bodies
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
@@ -246,4 +246,4 @@ contains
       separates = .false.
    end function separates
 
-end module polydem_exchanged_bodies
+end module polydem_added_and_removed

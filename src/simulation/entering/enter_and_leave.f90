@@ -3,7 +3,8 @@
 !> This is the first part of a step, so no checkpoint lies between it and the search for pairs that restores the contact
 !> history. Bodies leave first. All ranks draw the same candidates; each marks those that would meet a body of its own,
 !> and those that are left are compared with each other in the order in which they were drawn. All ranks decide alike.
-module polydem_exchange_bodies
+module polydem_enter_and_leave
+   use polydem_added_and_removed, only: append_added, number_added, removed_after
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_cell, only: cell_t, copies_within, shear_flow
@@ -14,7 +15,6 @@ module polydem_exchange_bodies
    use polydem_errors, only: error_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
-   use polydem_exchanged_bodies, only: append_added, number_added, removed_after
    use polydem_force_sums, only: energy_of_contact
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
@@ -27,12 +27,12 @@ module polydem_exchange_bodies
    use polydem_wall_energy, only: release_energy
    implicit none
    private
-   public :: exchange_bodies, find_leaving
+   public :: enter_and_leave, find_leaving
 
 contains
 
    !> Let bodies leave and enter before a step, if it is time. Collective; all ranks get the same error.
-   subroutine exchange_bodies(self, error)
+   subroutine enter_and_leave(self, error)
       !> The simulation between two steps
       type(simulation_t), intent(inout) :: self
       !> Allocated if there are no identifiers left
@@ -70,7 +70,7 @@ contains
       if (self%settings%output%energy_balance) call count_entering(self%energy_balance, self%comm, self%dt, &
          self%forces%gravity, added)
       call replace_bodies(self, kept, added, error)
-   end subroutine exchange_bodies
+   end subroutine enter_and_leave
 
    !> Count the masses of bodies that enter, in the order of their identifiers. Collective.
    subroutine count_masses(comm, added, origin, sources)
@@ -353,4 +353,4 @@ contains
       source%shapes = candidate%after
    end subroutine append_candidate
 
-end module polydem_exchange_bodies
+end module polydem_enter_and_leave
