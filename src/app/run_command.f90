@@ -101,8 +101,6 @@ contains
 
       if (self%continues .and. self%force) call raise(error, input_error, &
          '--continue cannot be combined with --force, which starts the run again; give only one of them')
-      if (self%continues .and. allocated(self%actions)) call raise(error, input_error, '--actions begins a run; '// &
-         '--continue goes on with the actions that the result has already: leave out --actions')
       if (self%may_change .and. .not. self%continues) call raise(error, input_error, '--changed needs --continue')
       if (self%help .or. self%version .or. self%file /= '') return
       if (self%checks) call raise(error, input_error, '--check needs the folder of a result: '// &

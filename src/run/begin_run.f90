@@ -1,6 +1,6 @@
 !> The beginning of a run: its calls in their order. All ranks build the scene alike; the root rank manages the folder.
 module polydem_begin_run
-   use polydem_action_record, only: read_record, take_record, write_record
+   use polydem_action_record, only: take_record, write_record
    use polydem_broadcaster, only: broadcaster_t
    use polydem_check_ranks, only: check_ranks
    use polydem_claim_folder, only: check_overwrite
@@ -38,7 +38,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error)) call read_record(run, error)
       if (.not. (allocated(error) .or. run%options%has_files)) then
          call build_start(settings, run, error)
          if (.not. allocated(error)) call take_record(run)

@@ -1,6 +1,6 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
-   use polydem_action_record, only: close_record
+   use polydem_action_record, only: close_record, read_record
    use polydem_begin_run, only: begin_run
    use polydem_checkpoint_fields, only: restarts_t
    use polydem_clock, only: wall_seconds
@@ -61,9 +61,11 @@ contains
       run%began = wall_seconds()
       call choose_communicator(run%comm, comm)
       run%folder = result_folder(settings)
-      if (run%options%continues) call find_finished_result(settings, run, last_state, error)
+      call read_record(run, error)
+      if (run%options%continues .and. .not. allocated(error)) &
+         call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
-      call begin_run(settings, force, run, error)
+      if (.not. allocated(error)) call begin_run(settings, force, run, error)
       if (allocated(error)) return
       run%has_begun = .true.
       call begin_steps(run, error)

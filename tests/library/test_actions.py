@@ -319,10 +319,16 @@ def test_a_run_with_a_file_of_actions_goes_on_after_a_kill(tmp_path, kill):
     run.wait()
     subprocess.run([*command, "--continue"], check=True, capture_output=True)
     assert Trajectory(tmp_path / "r").state_hash == expected
-    refused = subprocess.run([*command, "--continue", "--actions", str(actions)], check=False, capture_output=True,
-                             text=True)
-    assert refused.returncode == 2
-    assert "leave out --actions" in refused.stderr
+    repeated = [*command, "--continue", "--actions", str(actions)]
+    assert "nothing to do" in subprocess.run(repeated, check=True, capture_output=True, text=True).stdout
+    lines = actions.read_text(encoding="utf-8").splitlines(keepends=True)
+    for n, wrong in ((len(lines), lines[:-1]), (len(lines) + 1, [*lines, "1000 drag 1\n"]), (1, ["0 drag 1\n", *lines])):
+        actions.write_text("".join(wrong), encoding="utf-8")
+        refused = subprocess.run(repeated, check=False, capture_output=True, text=True)
+        assert refused.returncode == 2
+        assert f"{actions}: differs in action {n} from {tmp_path / 'r'}/actions.txt" in refused.stderr
+    (tmp_path / "r" / "actions.txt").unlink()
+    assert "began without actions" in subprocess.run(repeated, check=False, capture_output=True, text=True).stderr
 
 
 def test_a_run_that_is_killed_before_its_first_checkpoint_keeps_its_actions(tmp_path):
@@ -335,6 +341,11 @@ def test_a_run_that_is_killed_before_its_first_checkpoint_keeps_its_actions(tmp_
     run.kill()
     run.wait()
     assert not list((tmp_path / "r").glob("checkpoint_*"))
+    record = tmp_path / "r" / "actions.txt"
+    record.rename(f"{record}.unfinished")
+    lost = subprocess.run([*command, "--continue"], check=False, capture_output=True, text=True)
+    assert lost.returncode == 2 and "give them again with --actions" in lost.stderr
+    Path(f"{record}.unfinished").rename(record)
     subprocess.run([*command, "--continue"], check=True, capture_output=True)
     assert Trajectory(tmp_path / "r").state_hash == expected
 

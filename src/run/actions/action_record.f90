@@ -11,7 +11,7 @@ module polydem_action_record
    use polydem_folders, only: read_bytes
    use polydem_kinds, only: ip, lp
    use polydem_line_writer, only: line_writer_t
-   use polydem_result_files, only: actions_name, unfinished
+   use polydem_result_files, only: actions_name, checkpoint_path, profile_name, unfinished
    use polydem_run, only: run_t
    use polydem_strings, only: counted, to_text
    implicit none
@@ -31,21 +31,59 @@ contains
       type(run_t), intent(inout) :: run
       !> Names the file and the line
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: path
 
       if (allocated(run%options%actions)) then
          allocate (run%actions)
          call read_actions(run%options%actions, run%actions, error)
-      else if (run%options%continues .and. run%options%has_files) then
-         path = run%folder//'/'//actions_name
-         if (exists(path, error)) then
-            allocate (run%actions)
-            call read_actions(path, run%actions, error)
-         end if
       end if
+      if (run%options%continues .and. run%options%has_files .and. .not. allocated(error)) call recall_record(run, error)
       call run%comm%all_reduce_error(error)
       if (run%options%is_guest .and. .not. allocated(run%actions)) allocate (run%actions)
    end subroutine read_record
+
+   !> Take the actions that the result has already. A file that is given as well must have the same.
+   subroutine recall_record(run, error)
+      !> The run with its folder; `actions` are those of the file that is given
+      type(run_t), intent(inout) :: run
+      !> Names the files
+      type(error_t), allocatable, intent(inout) :: error
+      type(actions_t), allocatable :: given
+      character(len=:), allocatable :: path
+
+      path = run%folder//'/'//actions_name
+      if (exists(path, error)) then
+         call move_alloc(run%actions, given)
+         allocate (run%actions)
+         call read_actions(path, run%actions, error)
+         if (allocated(given) .and. .not. allocated(error)) call check_same(run%actions, given, error)
+      else if (.not. allocated(run%actions)) then
+         if (exists(path//unfinished, error)) call raise(error, input_error, path//unfinished//': the run ended '// &
+            'while it wrote its actions; give them again with --actions')
+      else if (any([exists(checkpoint_path(run%folder, 1_ip)), exists(checkpoint_path(run%folder, 2_ip)), &
+                    exists(run%folder//'/'//profile_name)])) then
+         call raise(error, input_error, run%actions%file//': the run in '//run%folder//' began without actions, '// &
+                    'and goes on without them; leave out --actions')
+      end if
+   end subroutine recall_record
+
+   !> Check that a file has the actions of a result.
+   subroutine check_same(recorded, given, error)
+      !> Actions of the result
+      type(actions_t), intent(in) :: recorded
+      !> Those of the file
+      type(actions_t), intent(in) :: given
+      !> Names both files, and the first action that differs
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k, n
+
+      n = min(recorded%n, given%n)
+      do k = 1, n
+         if (line_of(recorded%list(k)) /= line_of(given%list(k))) exit
+      end do
+      if (k > n .and. recorded%n == given%n) return
+      call raise(error, input_error, given%file//': differs in action '//to_text(int(k, ip))//' from '// &
+                 recorded%file//', with which the run goes on; leave out --actions')
+   end subroutine check_same
 
    !> Read a file of actions.
    subroutine read_actions(path, actions, error)
