@@ -42,7 +42,8 @@ WITHOUT_ERROR: dict[str, tuple[Any, list[Any]]] = {
 }
 WITH_ERROR: dict[str, tuple[Any, list[Any]]] = {
     "new_simulation": (c_void_p, [c_char_p, c_char_p, c_long, POINTER(c_char_p), c_char_p, c_int, c_int]),
-    "new_simulation_on_ranks": (c_void_p, [c_int, c_char_p, c_char_p, c_long, POINTER(c_char_p), c_char_p, c_int, c_int]),
+    "new_simulation_on_ranks": (c_void_p, [c_int, c_char_p, c_char_p, c_long, POINTER(c_char_p), c_char_p, c_int,
+                                           c_int]),
     "delete_simulation": (None, [POINTER(c_void_p)]),
     "advance": (c_long, [c_void_p, c_long, c_double]),
     "real": (c_double, [c_void_p, c_char_p]),
@@ -67,9 +68,8 @@ def find_library(name: str = NAME) -> Path:
     for place in [Path(given)] if given else places:
         if place.exists():
             return place
-    command = "./polydem build" if preset == "release" else "POLYDEM_PRESET=mpi ./polydem build"
     raise PolydemError(f"the library {name} is neither at {' nor at '.join(map(str, [given] if given else places))}: "
-                       f"build it with {command} {preset}, or name it in {variable}")
+                       f"build it with ./polydem build {preset}, or name it in {variable}")
 
 
 @cache
@@ -218,7 +218,7 @@ class Handle:
             return
         if self.ranks is not None:
             try:
-                self.ranks.agree("close", self.number)
+                self.ranks.agree("close", of=self)
             except InputError:
                 if self.pointer is not None:
                     raise

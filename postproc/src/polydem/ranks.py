@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Order = tuple[int, str, tuple[Any, ...]]
 
 #: Call of a process whose program ends
-AT_EXIT = "the end of the program"
+AT_EXIT = "exit"
 #: Longest description of a call in a message
 LONGEST = 80
 
@@ -56,28 +56,29 @@ class Ranks:
         if self._leads:
             self.comm.bcast((handle.number, method, arguments))
         else:
-            self.agree(method, handle.number, *arguments)
+            self.agree(method, *arguments, of=handle)
 
-    def agree(self, what: str, *arguments: Any) -> None:
+    def agree(self, what: str, *arguments: Any, of: Handle | None = None) -> None:
         """Refuse calls that not all processes make alike. If one of them closes a simulation, all are closed."""
         if self._leads:
             raise InputError("an observer runs on the root alone, where it can look and act; simulations are made, run, "
                              "copied, restored and closed outside of it, by all processes")
         if self._ended:
             raise InputError("another process has ended")
-        calls = self.comm.allgather(f"{what}({', '.join(map(_described, arguments))})" if arguments else what)
+        whose = f" of simulation {of.number}" if of is not None else ""
+        calls = self.comm.allgather(f"{what}({', '.join(map(_described, arguments))}){whose}")
         if all(call == calls[0] for call in calls):
             return
-        self._ended = AT_EXIT in calls
+        self._ended = any(call.startswith(AT_EXIT) for call in calls)
         if self._ended or any(call.startswith("close") for call in calls):
             self.close_all()
         other = next(rank for rank, call in enumerate(calls) if call != calls[0])
-        raise InputError(f"all processes must make the same calls: process 0 is at {calls[0][:LONGEST]}, process "
-                         f"{other} at {calls[other][:LONGEST]}")
+        raise InputError(f"all processes must make the same calls: process 0 makes {calls[0][:LONGEST]}, process "
+                         f"{other} {calls[other][:LONGEST]}")
 
     def run(self, handle: Handle, arguments: tuple[Any, ...], function: Callable[[], Any]) -> Any:
         """Call a function on the root; give its value, or raise its exception, on all processes."""
-        self.agree("run", handle.number, *arguments)
+        self.agree("run", *arguments, of=handle)
         if self.comm.rank == 0:
             self._leads, value, failure = True, None, None
             try:

@@ -548,7 +548,7 @@ class Simulation(Strict):
     def _agree(self, what: str, *arguments: Any) -> None:
         """Before a call that all processes must make, outside of observers."""
         if self._handle.ranks is not None and self._handle.open:
-            self._handle.ranks.agree(what, self._handle.number, *arguments)
+            self._handle.ranks.agree(what, *arguments, of=self._handle)
 
 
 def _numbers(values: npt.ArrayLike, n: int, what: str) -> npt.NDArray[np.float64]:
