@@ -24,8 +24,9 @@ contains
       type(contacts_t), intent(in) :: contacts
       !> Number of values per row
       integer(lp), intent(in) :: width
-      !> The rows, one after the other; unallocated if it is the other one, or if there is no such array
+      !> The rows, one after the other; unallocated if they are real numbers, or if there is no such array
       integer(lp), allocatable, intent(inout) :: integers(:)
+      !> Likewise, if they are whole numbers
       real(wp), allocatable, intent(inout) :: reals(:)
       type(row_distribution_t) :: rows
       integer(ip), allocatable :: counts(:)

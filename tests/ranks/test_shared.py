@@ -1,4 +1,4 @@
-"""Simulations that the processes of mpi4py share: the bits of one process, actions, exceptions on all, and no waiting."""
+"""Simulations that processes share through mpi4py: the bits of one process, actions, exceptions on all, no waiting."""
 
 import json
 import subprocess

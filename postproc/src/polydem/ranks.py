@@ -19,10 +19,6 @@ from .errors import InputError, PolydemError
 if TYPE_CHECKING:
     from .library import Handle
 
-#: Beginning of a message to the others: the number of a simulation, a method of its handle and the arguments. No method:
-#: the arguments are how `run` has ended
-Order = tuple[int, str, tuple[Any, ...]]
-
 #: Call of a process whose program ends
 AT_EXIT = "exit"
 #: Longest description of a call in a message
@@ -61,8 +57,8 @@ class Ranks:
     def agree(self, what: str, *arguments: Any, of: Handle | None = None) -> None:
         """Refuse calls that not all processes make alike. If one of them closes a simulation, all are closed."""
         if self._leads:
-            raise InputError("an observer runs on the root alone, where it can look and act; simulations are made, run, "
-                             "copied, restored and closed outside of it, by all processes")
+            raise InputError("an observer runs on the root alone, where it can look and act; simulations are made, "
+                             "run, copied, restored and closed outside of it, by all processes")
         if self._ended:
             raise InputError("another process has ended")
         whose = f" of simulation {of.number}" if of is not None else ""
@@ -94,7 +90,7 @@ class Ranks:
         return value
 
     def _follow(self) -> tuple[Any, ...]:
-        """Repeat the calls of the root until its `run` ends, and give how it has ended."""
+        """Repeat the calls of the root until one has no name: its arguments are how the `run` has ended."""
         self._follows = True
         try:
             while True:

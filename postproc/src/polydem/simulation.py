@@ -235,8 +235,9 @@ class Simulation(Strict):
         words = [override(entry, value).encode() for entry, value in (overrides or {}).items()]
         file, text = _name_and_text(source)
         mode = (CONTINUE if resume else FORCE if force else NEW) + EXCHANGE * bool(exchange)
-        arguments = (file.encode(), None if text is None else text.encode(), len(words), (c_char_p * len(words))(*words),
-                     None if folder is None else fspath(folder).encode(), mode, int(threads))
+        arguments = (file.encode(), None if text is None else text.encode(), len(words),
+                     (c_char_p * len(words))(*words), None if folder is None else fspath(folder).encode(), mode,
+                     int(threads))
         ranks = ranks_of(comm)
         if ranks is None:
             self._handle = Handle(call("new_simulation", *arguments))
