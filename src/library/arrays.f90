@@ -1,18 +1,23 @@
-!> Arrays of a simulation by name, copied row after row: bodies, their vertices, contacts, walls, energy and series.
+!> Arrays of a simulation by name, copied row after row: bodies, their vertices, contacts, walls, energy and series. On
+!> several ranks those of bodies, contacts and energy are collective, and all ranks get the whole.
 !>
 !> Names, units and meanings are those of the data sets of a result (postproc/file_formats.md): `bodies/position` is the
 !> column of /frames. Bodies are in ascending order of identifiers, which their slots have.
 module polydem_arrays
    use polydem_bodies, only: bodies_t
    use polydem_body_works, only: find_body_works
+   use polydem_communicator, only: communicator_t
    use polydem_contact_columns, only: contact_columns, values_of
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
+   use polydem_gathered_rows, only: gather_rows
    use polydem_handles, only: simulation_handle_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_run_output, only: update_balance
+   use polydem_simulation, only: simulation_t
    use polydem_strings, only: index_of
+   use polydem_wall_forces, only: complete_wall_forces
    use polydem_wall_load, only: wall_load_t
    implicit none
    private
@@ -44,8 +49,7 @@ contains
          select case (name(:max(slash - 1, 0)))
          case ('bodies')
             ! A step keeps the total forces on fixed bodies only.
-            if (s%loop%step == s%step .and. any(name(slash + 1:) == [character(len=6) :: 'force', 'torque'])) &
-               call total_forces(s%forces%gravity, s%loop%force_sums, s%bodies)
+            if (any(name(slash + 1:) == [character(len=6) :: 'force', 'torque'])) call find_forces(self%run%comm, s)
             if (any(name(slash + 1:) == [character(len=13) :: 'damping_work', 'friction_work']) .and. &
                 s%settings%output%energy_balance) call find_body_works(s%energy_balance, s%dt, s%forces%gravity, &
                s%loop%force_sums, s%loop%walls, s%bodies)
@@ -64,6 +68,8 @@ contains
          case default
             call raise_unknown(name, error)
          end select
+         if (.not. allocated(error)) call gather_rows(self%run%comm, name, s%bodies, s%contacts, width, &
+                                                       self%integers, self%reals)
       end associate
       kind = kind_absent
       rows = 0_lp
@@ -76,6 +82,20 @@ contains
          rows = size(self%reals, kind=lp)/width
       end if
    end subroutine find_array
+
+   !> Set the forces on all bodies of this rank, of which it moves the free ones, and of the root rank the fixed ones.
+   !> A step that has failed on any rank keeps those that it has.
+   subroutine find_forces(comm, s)
+      class(communicator_t), intent(inout) :: comm
+      type(simulation_t), intent(inout) :: s
+      integer(lp) :: has_none(1)
+
+      has_none = merge(1_lp, 0_lp, s%loop%step /= s%step)
+      call comm%all_reduce_max(has_none)
+      if (has_none(1) == 1_lp) return
+      call total_forces(s%forces%gravity, s%loop%force_sums, s%bodies)
+      call complete_wall_forces(comm, s%search%neighbours%pairs%first, s%loop%walls, s%bodies)
+   end subroutine find_forces
 
    !> Say that there is no array with a name.
    subroutine raise_unknown(name, error)

@@ -4,13 +4,15 @@ module polydem_library
       c_ptr
    use polydem_build_info, only: program_version
    use polydem_clock, only: wall_seconds
+   use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t, input_error, raise, stopped_early
    use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, give_text, leave, own, &
       simulation_handle_t, snapshot_t
-   use polydem_kinds, only: dp
+   use polydem_kinds, only: dp, ip
    use polydem_read_settings, only: read_settings, read_settings_text
    use polydem_run_simulation, only: end_run, interrupt_run, is_over, start_run, take_step
    use polydem_time_step, only: tabulate_contacts
+   use polydem_world_communicator, only: adopt_communicator
    implicit none
    private
 
@@ -82,7 +84,7 @@ contains
       end if
    end function polydem_error_message
 
-   !> Make a simulation and prepare its first step.
+   !> Make a simulation of this process and prepare its first step.
    function polydem_new_simulation(error, file, text, n_overrides, overrides, folder, mode, threads) bind(C) &
       result(handle)
       type(c_ptr), value :: error
@@ -100,12 +102,59 @@ contains
       integer(c_int), value :: threads
       type(c_ptr) :: handle
       type(error_handle_t), pointer :: e
-      type(simulation_handle_t), pointer :: made, self
-      character(len=:), allocatable :: words(:)
+      class(communicator_t), allocatable :: comm
 
       handle = c_null_ptr
       call find_error(error, e)
       if (.not. associated(e)) return
+      call choose_communicator(comm)
+      call make_simulation(comm, file, text, n_overrides, overrides, folder, mode, threads, handle, e%error)
+   end function polydem_new_simulation
+
+   !> Make a simulation of several processes.
+   function polydem_new_simulation_on_ranks(error, communicator, file, text, n_overrides, overrides, folder, mode, &
+                                            threads) bind(C) result(handle)
+      type(c_ptr), value :: error
+      !> Fortran handle of their communicator
+      integer(c_int), value :: communicator
+      !> Path or name, and text of the namelist
+      type(c_ptr), value :: file, text
+      !> Number of overrides
+      integer(c_long), value :: n_overrides
+      !> Pointers to the overrides
+      type(c_ptr), value :: overrides
+      !> Folder of the result
+      type(c_ptr), value :: folder
+      !> What becomes of a result that is in the folder, and whether bodies may enter and leave
+      integer(c_int), value :: mode
+      !> Number of OpenMP threads
+      integer(c_int), value :: threads
+      type(c_ptr) :: handle
+      type(error_handle_t), pointer :: e
+      class(communicator_t), allocatable :: comm
+
+      handle = c_null_ptr
+      call find_error(error, e)
+      if (.not. associated(e)) return
+      call adopt_communicator(int(communicator), c_associated(folder), comm, e%error)
+      if (.not. allocated(e%error)) call make_simulation(comm, file, text, n_overrides, overrides, folder, mode, &
+                                                         threads, handle, e%error)
+   end function polydem_new_simulation_on_ranks
+
+   !> Make a simulation and prepare its first step. Collective; all ranks get the same error.
+   subroutine make_simulation(comm, file, text, n_overrides, overrides, folder, mode, threads, handle, error)
+      class(communicator_t), intent(inout) :: comm
+      !> As of `polydem_new_simulation`
+      type(c_ptr), intent(in) :: file, text
+      integer(c_long), intent(in) :: n_overrides
+      type(c_ptr), intent(in) :: overrides, folder
+      integer(c_int), intent(in) :: mode, threads
+      !> The simulation; null after an error
+      type(c_ptr), intent(inout) :: handle
+      type(error_t), allocatable, intent(inout) :: error
+      type(simulation_handle_t), pointer :: made, self
+      character(len=:), allocatable :: words(:)
+
       allocate (made)
       call own(made, int(threads))
       made%run%options%is_guest = .true.
@@ -114,22 +163,23 @@ contains
       made%run%options%exchanges = mode >= mode_exchange
       call gather_overrides(n_overrides, overrides, fortran_text(folder), words)
       if (c_associated(text)) then
-         call read_settings_text(fortran_text(file), fortran_text(text), words, made%settings, e%error)
+         call read_settings_text(fortran_text(file), fortran_text(text), words, made%settings, error)
       else
-         call read_settings(fortran_text(file), words, made%settings, e%error)
+         call read_settings(fortran_text(file), words, made%settings, error)
       end if
-      if (.not. allocated(e%error)) then
-         call enter(c_loc(made), self, e%error)
-         call start_run(made%settings, mod(mode, 4_c_int) == mode_force, made%run, e%error)
-         if (allocated(e%error)) call end_quietly(made)
+      call comm%all_reduce_error(error)
+      if (.not. allocated(error)) then
+         call enter(c_loc(made), self, error)
+         call start_run(made%settings, mod(mode, 4_c_int) == mode_force, made%run, error, comm)
+         if (allocated(error)) call end_quietly(made)
          call leave(made)
       end if
-      if (allocated(e%error)) then
+      if (allocated(error)) then
          deallocate (made)
       else
          handle = c_loc(made)
       end if
-   end function polydem_new_simulation
+   end subroutine make_simulation
 
    !> End a run of which an error has been reported already.
    subroutine end_quietly(self)
@@ -196,13 +246,13 @@ contains
       type(c_ptr), value :: handle
       !> Greatest number of steps
       integer(c_long), value :: steps
-      !> Elapsed time after which one more step is the last [s]; 0: no limit
+      !> Elapsed time after which one more step is the last [s]; 0: no limit. Clocks of ranks differ: they have none
       real(c_double), value :: seconds
       integer(c_long) :: done
       type(error_handle_t), pointer :: e
       type(simulation_handle_t), pointer :: self
       real(dp) :: began
-      logical :: is_last
+      logical :: has_limit, is_last
 
       done = 0_c_long
       call find_error(error, e)
@@ -211,10 +261,11 @@ contains
       if (.not. associated(self)) return
       if (allocated(self%failure)) call raise(e%error, self%failure%code, 'the run has stopped: '//self%failure%message)
       began = wall_seconds()
+      has_limit = seconds > 0.0_c_double .and. self%run%comm%size == 1_ip
       is_last = .false.
       do while (done < steps .and. .not. (is_last .or. is_over(self%run) .or. allocated(e%error)))
          is_last = done + 1_c_long == steps
-         if (seconds > 0.0_c_double .and. .not. is_last) is_last = wall_seconds() - began >= seconds
+         if (has_limit .and. .not. is_last) is_last = wall_seconds() - began >= seconds
          self%run%options%tabulates = is_last
          call take_step(self%run, e%error)
          done = done + 1_c_long
@@ -279,6 +330,8 @@ contains
          call c_f_pointer(snapshot, from)
          if (from%simulation%settings%resolved /= self%run%simulation%settings%resolved) then
             call raise(e%error, input_error, 'the snapshot is of a simulation with other settings')
+         else if (from%simulation%comm%size /= self%run%comm%size) then
+            call raise(e%error, input_error, 'the snapshot is of a simulation on another number of processes')
          else
             self%run%simulation = from%simulation
             self%run%has_begun = .true.

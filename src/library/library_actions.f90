@@ -43,7 +43,9 @@ contains
          self%run%simulation%actions%n, e%error)
       if (action%kind == remove_bodies .and. self%run%simulation%loop%step /= self%run%simulation%step) &
          call raise(e%error, input_error, 'bodies cannot be removed before the first step of a run that is resumed')
-      if (.not. allocated(e%error) .and. self%run%options%has_files) call append_to_record(self%run, action, e%error)
+      if (.not. allocated(e%error) .and. self%run%options%has_files .and. self%run%comm%is_root()) &
+         call append_to_record(self%run, action, e%error)
+      call self%run%comm%all_reduce_error(e%error)
       if (.not. allocated(e%error)) call self%run%simulation%actions%append(action)
       call leave(self)
    end subroutine polydem_act

@@ -5,6 +5,7 @@ module polydem_library_values
    use polydem_added_and_removed, only: number_added
    use polydem_arrays, only: find_array
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_gathered_rows, only: number_of_contacts
    use polydem_global_hash, only: hash_all_bodies
    use polydem_handles, only: enter, error_handle_t, find_error, fortran_text, give_text, leave, simulation_handle_t
    use polydem_hash, only: hexadecimal
@@ -79,9 +80,9 @@ contains
          case ('stage')
             value = int(s%stages%number, c_long)
          case ('bodies')
-            value = int(s%bodies%n, c_long)
+            value = int(s%bodies%n_all, c_long)
          case ('contacts')
-            value = int(s%contacts%n, c_long)
+            value = int(number_of_contacts(self%run%comm, s%bodies, s%contacts), c_long)
          case ('threads')
             value = int(self%threads, c_long)
          case ('next_id')

@@ -50,6 +50,15 @@ long polydem_error_message(polydem_error error, char *buffer, long size);
 polydem_simulation polydem_new_simulation(polydem_error error, const char *file, const char *text, long n_overrides,
                                           const char *const *overrides, const char *folder, int mode, int threads);
 
+/* Make a simulation of the processes of a communicator of MPI, with the library libpolydem_mpi. The program starts MPI
+ * before, gives the Fortran handle of the communicator (MPI_Comm_c2f), and ends MPI after it has deleted the simulation.
+ * With a folder it has all processes. All calls but those for errors, copies of arrays, snapshots that are deleted, real
+ * values, and whole numbers other than "contacts" are collective: all processes make them alike and in the same order.
+ * All get the same values and errors. `seconds` of polydem_advance has no effect. */
+polydem_simulation polydem_new_simulation_on_ranks(polydem_error error, int communicator, const char *file,
+                                                   const char *text, long n_overrides, const char *const *overrides,
+                                                   const char *folder, int mode, int threads);
+
 /* End the run and free its memory. A run with a folder that is not over is interrupted: `polydem run --continue`, or
  * POLYDEM_CONTINUE, goes on with it. */
 void polydem_delete_simulation(polydem_error error, polydem_simulation *simulation);

@@ -106,7 +106,7 @@ class Toy(unittest.TestCase):
         shutil.copy(os.path.join(os.path.dirname(LAUNCHER), WATCHER), os.path.join(self.folder, WATCHER))
         self.write("CMakeLists.txt", CMAKE_LISTS)
         self.write("CMakePresets.json", PRESETS)
-        self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\n")
+        self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\nadd_custom_target(polydem_library)\n")
         self.write("src/app/main.f90", PROGRAM)
         self.write("tests/verification/CMakeLists.txt", "add_executable(verify ../../src/app/main.f90)\n")
         for place in HELP_PLACES:

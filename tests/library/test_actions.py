@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import polydem
 import pytest
+from polydem import library
 from polydem_post import Trajectory
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
@@ -449,12 +450,11 @@ def test_bodies_do_not_leave_unless_the_run_expects_it(free):
             act()
 
 
-def test_several_processes_are_refused_with_the_way_to_have_them():
-    class Comm:
-        size = 3
-
-    with pytest.raises(polydem.InputError, match="--ranks N --actions"):
-        polydem.Simulation(FREE, comm=Comm())
+def test_what_is_no_communicator_is_refused():
+    with pytest.raises(polydem.InputError, match="intracommunicator of mpi4py"):
+        polydem.Simulation(FREE, comm=4)
+    with pytest.raises(polydem.InputError, match="libpolydem_mpi"):
+        library.call("new_simulation_on_ranks", 0, b"none", None, 0, None, None, 0, 1)
 
 
 def test_a_gate_that_opens_when_bodies_leave_closes_the_balance():

@@ -29,6 +29,9 @@ def main() -> int:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_COMM_WORLD")}
     environment["POLYDEM_MPI_PROGRAM"] = str(Path(environment["POLYDEM_MPI_PROGRAM"]).resolve())
     environment["POLYDEM_PROGRAM"] = str(program)
+    for variable, owner in (("POLYDEM_LIBRARY", program), ("POLYDEM_MPI_LIBRARY", environment["POLYDEM_MPI_PROGRAM"])):
+        libraries = Path(owner).parents[1].joinpath("library").glob("libpolydem*.so.0")
+        environment[variable] = str(next(libraries, ""))
     environment["POLYDEM_SOURCE_DIR"] = str(root)
     environment["PYTHONPATH"] = str(root / "postproc" / "src")
     environment["PYTHONDONTWRITEBYTECODE"] = "1"

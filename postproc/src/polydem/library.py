@@ -14,13 +14,22 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import BY_CODE, InputError, PolydemError
+from .ranks import Ranks
 
 #: Name of the file
 NAME = "libpolydem.so.0"
+#: Name of that for several processes
+MPI_NAME = "libpolydem_mpi.so.0"
+#: Preset of the sources that makes it, and environment variable that names it
+PRESETS = {NAME: ("release", "POLYDEM_LIBRARY"), MPI_NAME: ("mpi", "POLYDEM_MPI_LIBRARY")}
+#: First part of a name of a text or array that all processes must ask for
+SHARED = ("state_hash", "bodies", "contacts", "energy")
 
 #: Debian packages of the libraries that it may want
 PACKAGES = {"libgomp.so.1": "libgomp1", "libgfortran.so.5": "libgfortran5", "libhdf5_serial.so.103": "libhdf5-103-1",
-            "libhdf5_serial_fortran.so.102": "libhdf5-fortran-102"}
+            "libhdf5_serial_fortran.so.102": "libhdf5-fortran-102", "libmpi_usempif08.so.40": "libopenmpi3",
+            "libmpi.so.40": "libopenmpi3", "libhdf5_openmpi.so.103": "libhdf5-openmpi-103-1",
+            "libhdf5_openmpi_fortran.so.102": "libhdf5-openmpi-fortran-102"}
 
 #: Result and arguments of each function, after the error handle where it has one
 WITHOUT_ERROR: dict[str, tuple[Any, list[Any]]] = {
@@ -33,6 +42,8 @@ WITHOUT_ERROR: dict[str, tuple[Any, list[Any]]] = {
 }
 WITH_ERROR: dict[str, tuple[Any, list[Any]]] = {
     "new_simulation": (c_void_p, [c_char_p, c_char_p, c_long, POINTER(c_char_p), c_char_p, c_int, c_int]),
+    "new_simulation_on_ranks": (c_void_p, [c_int, c_char_p, c_char_p, c_long, POINTER(c_char_p), c_char_p, c_int,
+                                           c_int]),
     "delete_simulation": (None, [POINTER(c_void_p)]),
     "advance": (c_long, [c_void_p, c_long, c_double]),
     "real": (c_double, [c_void_p, c_char_p]),
@@ -48,33 +59,34 @@ WITH_ERROR: dict[str, tuple[Any, list[Any]]] = {
 }
 
 
-def find_library() -> Path:
-    """The library that POLYDEM_LIBRARY names, that beside this package, or that of the release build of the sources."""
-    given = os.environ.get("POLYDEM_LIBRARY")
+def find_library(name: str = NAME) -> Path:
+    """The library that an environment variable names, that beside this package, or that of a build of the sources."""
+    preset, variable = PRESETS[name]
+    given = os.environ.get(variable)
     here = Path(__file__).resolve().parent
-    places = [here / NAME, here.parents[2] / "build" / "release" / "src" / "library" / NAME]
+    places = [here / name, here.parents[2] / "build" / preset / "src" / "library" / name]
     for place in [Path(given)] if given else places:
         if place.exists():
             return place
-    raise PolydemError(f"the library {NAME} is neither at {' nor at '.join(map(str, [given] if given else places))}: "
-                       "build it with ./polydem build release, or name it in POLYDEM_LIBRARY")
+    raise PolydemError(f"the library {name} is neither at {' nor at '.join(map(str, [given] if given else places))}: "
+                       f"build it with ./polydem build {preset}, or name it in {variable}")
 
 
 @cache
-def load() -> ctypes.CDLL:
-    """The library, with the types of its functions."""
-    place = find_library()
+def load(library: str = NAME) -> ctypes.CDLL:
+    """A library, with the types of its functions."""
+    place = find_library(library)
     try:
-        library = ctypes.CDLL(str(place))
+        loaded = ctypes.CDLL(str(place))
     except OSError as error:
         missing = str(error).partition(":")[0]
         where = f"; in Debian and Ubuntu it is in the package {PACKAGES[missing]}" if missing in PACKAGES else ""
         raise PolydemError(f"{place} cannot be loaded: {error}{where}") from error
     for name, (result, arguments) in WITHOUT_ERROR.items():
-        _declare(library, name, result, arguments)
+        _declare(loaded, name, result, arguments)
     for name, (result, arguments) in WITH_ERROR.items():
-        _declare(library, name, result, [c_void_p, *arguments])
-    return library
+        _declare(loaded, name, result, [c_void_p, *arguments])
+    return loaded
 
 
 def _declare(library: ctypes.CDLL, name: str, result: Any, arguments: list[Any]) -> None:
@@ -83,35 +95,35 @@ def _declare(library: ctypes.CDLL, name: str, result: Any, arguments: list[Any])
 
 
 class _Errors(threading.local):
-    """An error handle for each thread."""
+    """An error handle of each library for each thread."""
 
     def __init__(self) -> None:
-        self._handle: c_void_p | None = None
+        self._handles: dict[str, c_void_p] = {}
 
-    def handle(self) -> c_void_p:
+    def handle(self, library: str) -> c_void_p:
         """The handle of this thread, made when it is needed first."""
-        if self._handle is None:
-            self._handle = c_void_p(load().polydem_new_error())
-        return self._handle
+        if library not in self._handles:
+            self._handles[library] = c_void_p(load(library).polydem_new_error())
+        return self._handles[library]
 
     def __del__(self) -> None:
-        if self._handle is not None:
-            load().polydem_delete_error(byref(self._handle))
+        for library, handle in self._handles.items():
+            load(library).polydem_delete_error(byref(handle))
 
 
 _ERRORS = _Errors()
 
 
-def call(name: str, *arguments: Any) -> Any:
+def call(name: str, *arguments: Any, library: str = NAME) -> Any:
     """Call a function that may fail; its error becomes an exception."""
-    library = load()
-    error = _ERRORS.handle()
-    result = getattr(library, f"polydem_{name}")(error, *arguments)
-    code = library.polydem_error_code(error)
+    loaded = load(library)
+    error = _ERRORS.handle(library)
+    result = getattr(loaded, f"polydem_{name}")(error, *arguments)
+    code = loaded.polydem_error_code(error)
     if code != 0:
-        size = library.polydem_error_message(error, None, 0) + 1
+        size = loaded.polydem_error_message(error, None, 0) + 1
         buffer = ctypes.create_string_buffer(size)
-        library.polydem_error_message(error, buffer, size)
+        loaded.polydem_error_message(error, buffer, size)
         raise BY_CODE.get(code, PolydemError)(buffer.value.decode(errors="replace"))
     return result
 
@@ -126,10 +138,17 @@ def version() -> str:
 class Handle:
     """A simulation of the library, until it is closed."""
 
-    def __init__(self, pointer: int):
+    def __init__(self, pointer: int, ranks: Ranks | None = None):
         self.pointer: c_void_p | None = c_void_p(pointer)
         #: Whether observers are called: after the last step their actions have no effect, since no step follows
         self.observed = False
+        #: Processes that share it; None: this one alone
+        self.ranks = ranks
+        #: Its number among those of these processes
+        self.number = 0
+        if ranks is not None:
+            self.number = ranks.number()
+            ranks.handles[self.number] = self
 
     @property
     def open(self) -> c_void_p:
@@ -138,29 +157,44 @@ class Handle:
             raise InputError("the simulation is closed")
         return self.pointer
 
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Call a function for this simulation."""
+        return call(name, self.open, *arguments, library=library_for(self.ranks))
+
+    def meet(self, method: str, *arguments: Any) -> None:
+        """Before a call that all processes must make."""
+        if self.ranks is not None and self.open:
+            self.ranks.meet(self, method, *arguments)
+
     def real(self, name: str) -> float:
         """A real value by its name."""
-        return float(call("real", self.open, name.encode()))
+        return float(self.call("real", name.encode()))
 
     def integer(self, name: str) -> int:
         """A whole number by its name."""
-        return int(call("integer", self.open, name.encode()))
+        if name == "contacts":
+            self.meet("integer", name)
+        return int(self.call("integer", name.encode()))
 
     def text(self, name: str) -> str:
         """A text by its name."""
-        size = call("text", self.open, name.encode(), None, 0) + 1
+        if name in SHARED:
+            self.meet("text", name)
+        size = self.call("text", name.encode(), None, 0) + 1
         buffer = ctypes.create_string_buffer(size)
-        call("text", self.open, name.encode(), buffer, size)
+        self.call("text", name.encode(), buffer, size)
         return buffer.value.decode(errors="replace")
 
     def array(self, name: str) -> npt.NDArray[Any] | None:
         """A copy of an array, (rows) or (rows, 2); None: this simulation does not have it."""
+        if name.partition("/")[0] in SHARED:
+            self.meet("array", name)
         shape = (c_long * 2)()
-        kind = call("find_array", self.open, name.encode(), shape)
+        kind = self.call("find_array", name.encode(), shape)
         if kind == 0:
             return None
         values = np.empty(shape[0] * shape[1], dtype=np.int64 if kind == 1 else np.float64)
-        call("copy_integers" if kind == 1 else "copy_reals", self.open, c_void_p(values.ctypes.data), values.size)
+        self.call("copy_integers" if kind == 1 else "copy_reals", c_void_p(values.ctypes.data), values.size)
         return values if shape[1] == 1 else values.reshape(shape[0], shape[1])
 
     def act(self, kind: str, name: str = "", bodies: npt.ArrayLike = (), values: npt.ArrayLike = ()) -> None:
@@ -169,13 +203,37 @@ class Handle:
         numbers = np.ascontiguousarray(np.asarray(values, dtype=np.float64).ravel())
         if self.observed and self.integer("is_over") == 1:
             return
-        call("act", self.open, kind.encode(), name.encode(), ids.size, c_void_p(ids.ctypes.data), numbers.size,
-             c_void_p(numbers.ctypes.data))
+        self.meet("act", kind, name, ids, numbers)
+        self.call("act", kind.encode(), name.encode(), ids.size, c_void_p(ids.ctypes.data), numbers.size,
+                  c_void_p(numbers.ctypes.data))
+
+    def advance(self, steps: int, seconds: float) -> int:
+        """Advance by some steps, at most for a moment; several processes all the steps. Return their number."""
+        self.meet("advance", steps, seconds)
+        return int(self.call("advance", steps, seconds))
 
     def close(self) -> None:
         """End the run and free the simulation. A second call does nothing."""
         if self.pointer is None:
             return
-        pointer = self.pointer
-        call("delete_simulation", byref(pointer))
+        if self.ranks is not None:
+            try:
+                self.ranks.agree("close", of=self)
+            except InputError:
+                if self.pointer is not None:
+                    raise
+                return
+        self.free()
+
+    def free(self) -> None:
+        """Close it, as all processes do."""
+        pointer = self.open
+        if self.ranks is not None:
+            del self.ranks.handles[self.number]
+        call("delete_simulation", byref(pointer), library=library_for(self.ranks))
         self.pointer = None
+
+
+def library_for(ranks: Ranks | None) -> str:
+    """Name of the library for some processes."""
+    return NAME if ranks is None else MPI_NAME

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import InputError
-from .library import Handle, call, load
+from .library import Handle, call, library_for, load
 from .live import LiveSource, live_frame
 from .namelist import override, write_namelist
+from .ranks import Ranks, ranks_of
 
 #: Elapsed time of a call of the library, after which Python looks for Ctrl-C [s]
 PATIENCE = 0.1
@@ -196,16 +197,17 @@ class Load(Strict):
 class Snapshot:
     """A state of a simulation, to which it can return as often as wanted."""
 
-    def __init__(self, pointer: int):
-        self._pointer = c_void_p(pointer)
+    def __init__(self, pointer: int, ranks: Ranks | None = None):
+        self._pointer, self._ranks = c_void_p(pointer), ranks
+        self._number = 0 if ranks is None else ranks.number()
 
     def __del__(self) -> None:
         if self._pointer:
-            load().polydem_delete_snapshot(byref(self._pointer))
+            load(library_for(self._ranks)).polydem_delete_snapshot(byref(self._pointer))
 
 
 class Simulation(Strict):
-    """A simulation in this process.
+    """A simulation in this process, or shared by several.
 
         source     path of a namelist, its text, or a dictionary {"forces": {"gravity": (0, -9.81)}, ...}
         overrides  {"forces.friction_coefficient": 0.4, ...}
@@ -213,10 +215,11 @@ class Simulation(Strict):
         folder     folder of the result, which is that of `polydem run`; None: nothing is written
         force, resume  whether a result in the folder is replaced, or continued
         exchange   whether bodies may be added and removed
-        comm       None: a simulation in Python computes in one process
+        comm       communicator of mpi4py whose processes share the simulation; None: this one alone
 
     Use it in a `with` statement, or call `close`. A simulation with a folder that is closed before its end is
-    interrupted and can be resumed. Values are copies. One thread at a time may use a simulation.
+    interrupted and can be resumed. Values are copies. One thread at a time may use a simulation. With `comm` all
+    processes call it alike, but for plain numbers and names; observers run on the root alone.
     """
 
     def __init__(self, source: str | PathLike[str] | Mapping[str, Any],
@@ -227,17 +230,21 @@ class Simulation(Strict):
         self._stop: str | None = None
         if force and resume:
             raise InputError("force starts the run again, resume goes on with it: choose one")
-        if comm is not None and getattr(comm, "size", 1) != 1:
-            raise InputError("a simulation in Python computes in one process; record its actions, and repeat them with "
-                             "polydem run --ranks N --actions FILE")
         if (force or resume) and folder is None:
             raise InputError("force and resume need a folder")
         words = [override(entry, value).encode() for entry, value in (overrides or {}).items()]
         file, text = _name_and_text(source)
-        pointer = call("new_simulation", file.encode(), None if text is None else text.encode(), len(words),
-                       (c_char_p * len(words))(*words), None if folder is None else fspath(folder).encode(),
-                       (CONTINUE if resume else FORCE if force else NEW) + EXCHANGE * bool(exchange), int(threads))
-        self._handle = Handle(pointer)
+        mode = (CONTINUE if resume else FORCE if force else NEW) + EXCHANGE * bool(exchange)
+        arguments = (file.encode(), None if text is None else text.encode(), len(words),
+                     (c_char_p * len(words))(*words), None if folder is None else fspath(folder).encode(), mode,
+                     int(threads))
+        ranks = ranks_of(comm)
+        if ranks is None:
+            self._handle = Handle(call("new_simulation", *arguments))
+            return
+        ranks.agree("Simulation", file, text, words, folder, mode)
+        pointer = call("new_simulation_on_ranks", ranks.comm.py2f(), *arguments, library=library_for(ranks))
+        self._handle = Handle(pointer, ranks)
 
     # --- life ---------------------------------------------------------------------------------------------------------
 
@@ -251,15 +258,18 @@ class Simulation(Strict):
         self.close()
 
     def __del__(self) -> None:
-        if hasattr(self, "_handle"):
+        # Several processes may not come here at the same time: theirs are closed at the end of the program.
+        if hasattr(self, "_handle") and self._handle.ranks is None:
             self.close()
 
     def __repr__(self) -> str:
         """Time, step and bodies."""
         if self._handle.pointer is None:
             return "<Simulation: closed>"
+        ranks = self._handle.ranks
+        last = f"{len(self.contacts)} contacts" if ranks is None else f"{ranks.comm.size} processes"
         return (f"<Simulation: t = {self.time:.6g} s, step {self.step} of {self.n_steps}, {len(self.bodies)} bodies, "
-                f"{len(self.contacts)} contacts>")
+                f"{last}>")
 
     def close(self) -> None:
         """End the run, complete its files and free its memory; a second call does nothing."""
@@ -273,8 +283,18 @@ class Simulation(Strict):
 
         Without arguments to the end of the run; else `steps` steps, `duration` seconds of simulated time from now, or
         up to the first step that is not before the time `until`. Ctrl-C, and an exception of an observer, end it
-        between two steps in a good state.
+        between two steps in a good state; all processes of a `comm` get the exception.
         """
+        ranks = self._handle.ranks
+        if ranks is None:
+            return self._run(steps, until, duration)
+        self._stop = None
+        done, self._stop = ranks.run(self._handle, (steps, until, duration),
+                                     lambda: (self._run(steps, until, duration), self._stop))
+        return int(done)
+
+    def _run(self, steps: int | None, until: float | None, duration: float | None) -> int:
+        """Run on this process, or on the root of several."""
         if sum(each is not None for each in (steps, until, duration)) > 1:
             raise InputError("give one of steps, until and duration")
         begin, dt = self.step, self.dt
@@ -303,7 +323,7 @@ class Simulation(Strict):
         """
         for interval, _ in self._observers:
             end = min(end, (now // interval + 1) * interval)
-        done = int(call("advance", self._handle.open, end - now, PATIENCE))
+        done = self._handle.advance(end - now, PATIENCE)
         self._handle.observed = True
         try:
             for interval, observer in list(self._observers):
@@ -508,18 +528,28 @@ class Simulation(Strict):
 
     def snapshot(self) -> Snapshot:
         """The present state."""
-        return Snapshot(call("new_snapshot", self._handle.open))
+        self._agree("snapshot")
+        return Snapshot(self._handle.call("new_snapshot"), self._handle.ranks)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a state, of this simulation or of one with the same settings; what follows has the same bits."""
-        call("restore", self._handle.open, snapshot._pointer)
+        if snapshot._ranks is not self._handle.ranks:
+            raise InputError("the snapshot is of a simulation on other processes")
+        self._agree("restore", snapshot._number)
+        self._handle.call("restore", snapshot._pointer)
 
     def copy(self) -> Simulation:
         """Another simulation, without a folder and without observers, that goes on from this state."""
+        self._agree("copy")
         other = Simulation.__new__(Simulation)
         other._observers, other._stop = [], None
-        other._handle = Handle(call("copy_simulation", self._handle.open))
+        other._handle = Handle(self._handle.call("copy_simulation"), self._handle.ranks)
         return other
+
+    def _agree(self, what: str, *arguments: Any) -> None:
+        """Before a call that all processes must make, outside of observers."""
+        if self._handle.ranks is not None and self._handle.open:
+            self._handle.ranks.agree(what, *arguments, of=self._handle)
 
 
 def _numbers(values: npt.ArrayLike, n: int, what: str) -> npt.NDArray[np.float64]:

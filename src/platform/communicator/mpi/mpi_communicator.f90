@@ -4,7 +4,7 @@
 !> copy array sections and does not use the asynchronous attribute. A compiler may therefore keep values of a buffer
 !> only until the next call that has the buffer as an argument. Both procedures of an exchange have them as arguments.
 module polydem_mpi_communicator
-   use mpi_f08, only: mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoall, mpi_bcast, mpi_byte, mpi_comm_world, &
+   use mpi_f08, only: mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoall, mpi_bcast, mpi_byte, mpi_comm, &
       mpi_finalize, mpi_in_place, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &
       mpi_recv, mpi_request, mpi_request_null, mpi_send, mpi_statuses_ignore, mpi_status_ignore, mpi_sum, mpi_waitall
    use polydem_communicator, only: neighbour_ranks_t, communicator_t
@@ -13,8 +13,10 @@ module polydem_mpi_communicator
    private
    public :: mpi_communicator_t
 
-   !> All ranks of MPI_COMM_WORLD
+   !> The ranks of a communicator of MPI
    type, extends(communicator_t) :: mpi_communicator_t
+      !> That communicator
+      type(mpi_comm) :: handle
       !> Unfinished messages of an exchange
       type(mpi_request), allocatable, private :: requests(:)
    contains
@@ -41,7 +43,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
-      call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_sum, mpi_comm_world)
+      call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_sum, self%handle)
    end subroutine all_reduce_sum
 
    !> Replace numbers by their maxima over all ranks.
@@ -50,7 +52,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
-      call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_max, mpi_comm_world)
+      call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_max, self%handle)
    end subroutine all_reduce_max_longs
 
    !> Broadcast numbers of the root rank.
@@ -59,7 +61,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
-      call mpi_bcast(values, size(values), mpi_integer8, 0, mpi_comm_world)
+      call mpi_bcast(values, size(values), mpi_integer8, 0, self%handle)
    end subroutine broadcast_longs
 
    !> Collect the lists of all ranks on every rank.
@@ -70,11 +72,11 @@ contains
       integer(ip), allocatable, intent(out) :: counts(:)
       integer :: lengths(0:self%size - 1_ip), starts(0:self%size - 1_ip)
 
-      call mpi_allgather(size(mine), 1, mpi_integer, lengths, 1, mpi_integer, mpi_comm_world)
+      call mpi_allgather(size(mine), 1, mpi_integer, lengths, 1, mpi_integer, self%handle)
       starts = starts_of(lengths)
       allocate (all_of_them(sum(lengths)), counts(0:self%size - 1_ip))
       counts = int(lengths, ip)
-      call mpi_allgatherv(mine, size(mine), mpi_integer8, all_of_them, lengths, starts, mpi_integer8, mpi_comm_world)
+      call mpi_allgatherv(mine, size(mine), mpi_integer8, all_of_them, lengths, starts, mpi_integer8, self%handle)
    end subroutine gather_longs
 
    !> Send rows to all ranks and receive rows from all ranks.
@@ -90,7 +92,7 @@ contains
 
       width = size(rows, 1)
       n_out = int(counts)
-      call mpi_alltoall(n_out, 1, mpi_integer, n_in, 1, mpi_integer, mpi_comm_world)
+      call mpi_alltoall(n_out, 1, mpi_integer, n_in, 1, mpi_integer, self%handle)
       from = starts_of(n_in)
       to = starts_of(n_out)
       allocate (received(width, sum(n_in)), counts_received(0:self%size - 1_ip))
@@ -99,12 +101,12 @@ contains
       do k = 0, int(self%size) - 1
          if (n_in(k) == 0 .or. k == self%rank) cycle
          n = n + 1
-         call mpi_irecv(received(1, from(k) + 1), width*n_in(k), mpi_integer8, k, tag, mpi_comm_world, requests(n))
+         call mpi_irecv(received(1, from(k) + 1), width*n_in(k), mpi_integer8, k, tag, self%handle, requests(n))
       end do
       do k = 0, int(self%size) - 1
          if (n_out(k) == 0 .or. k == self%rank) cycle
          n = n + 1
-         call mpi_isend(rows(1, to(k) + 1), width*n_out(k), mpi_integer8, k, tag, mpi_comm_world, requests(n))
+         call mpi_isend(rows(1, to(k) + 1), width*n_out(k), mpi_integer8, k, tag, self%handle, requests(n))
          self%messages = self%messages + 1_lp
          self%bytes = self%bytes + int(width, lp)*int(n_out(k), lp)*int(storage_size(rows)/8, lp)
       end do
@@ -131,12 +133,12 @@ contains
       do k = 1, size(route%rank)
          bytes = row_bytes*int(route%received(k + 1) - route%received(k))
          if (bytes > 0) call mpi_irecv(received(1, route%received(k)), bytes, mpi_byte, int(route%rank(k)), tag, &
-                                       mpi_comm_world, self%requests(2*k - 1))
+                                       self%handle, self%requests(2*k - 1))
       end do
       do k = 1, size(route%rank)
          bytes = row_bytes*int(route%sent(k + 1) - route%sent(k))
          if (bytes == 0) cycle
-         call mpi_isend(sent(1, route%sent(k)), bytes, mpi_byte, int(route%rank(k)), tag, mpi_comm_world, &
+         call mpi_isend(sent(1, route%sent(k)), bytes, mpi_byte, int(route%rank(k)), tag, self%handle, &
                         self%requests(2*k))
          self%messages = self%messages + 1_lp
          self%bytes = self%bytes + int(bytes, lp)
@@ -160,7 +162,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%rank == 0_ip) return
-      call mpi_recv(values, size(values), mpi_integer8, int(self%rank) - 1, tag, mpi_comm_world, mpi_status_ignore)
+      call mpi_recv(values, size(values), mpi_integer8, int(self%rank) - 1, tag, self%handle, mpi_status_ignore)
    end subroutine receive_from_previous
 
    !> Send numbers to rank + 1. Nothing happens on the last rank.
@@ -169,7 +171,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%rank == self%size - 1_ip) return
-      call mpi_send(values, size(values), mpi_integer8, int(self%rank) + 1, tag, mpi_comm_world)
+      call mpi_send(values, size(values), mpi_integer8, int(self%rank) + 1, tag, self%handle)
    end subroutine send_to_next
 
    !> End MPI.

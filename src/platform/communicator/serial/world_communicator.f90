@@ -4,7 +4,7 @@ module polydem_world_communicator
    use polydem_errors, only: error_t, input_error, raise
    implicit none
    private
-   public :: create_world
+   public :: create_world, adopt_communicator
 
    !> Environment variables in which Open MPI and other launchers store the number of processes
    character(len=*), parameter :: size_variables(*) = [character(len=20) :: 'OMPI_COMM_WORLD_SIZE', 'PMI_SIZE']
@@ -27,5 +27,23 @@ contains
             'FILE.nml --ranks '//trim(size)//', which builds and starts it')
       end do
    end subroutine create_world
+
+   !> Refuse a communicator of MPI.
+   subroutine adopt_communicator(handle, has_files, comm, error)
+      !> Its Fortran handle, an integer
+      integer, intent(in) :: handle
+      !> Whether its ranks write files
+      logical, intent(in) :: has_files
+      !> That of this process alone
+      class(communicator_t), allocatable, intent(out) :: comm
+      !> Allocated
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused => handle, unused_files => has_files)
+      end associate
+      allocate (communicator_t :: comm)
+      call raise(error, input_error, 'this library is of one process; several need that of a build with MPI, '// &
+                 'libpolydem_mpi')
+   end subroutine adopt_communicator
 
 end module polydem_world_communicator
