@@ -323,7 +323,8 @@ def test_a_run_with_a_file_of_actions_goes_on_after_a_kill(tmp_path, kill):
     repeated = [*command, "--continue", "--actions", str(actions)]
     assert "nothing to do" in subprocess.run(repeated, check=True, capture_output=True, text=True).stdout
     lines = actions.read_text(encoding="utf-8").splitlines(keepends=True)
-    for n, wrong in ((len(lines), lines[:-1]), (len(lines) + 1, [*lines, "1000 drag 1\n"]), (1, ["0 drag 1\n", *lines])):
+    for n, wrong in ((len(lines), lines[:-1]), (len(lines) + 1, [*lines, "1000 drag 1\n"]),
+                     (1, ["0 drag 1\n", *lines])):
         actions.write_text("".join(wrong), encoding="utf-8")
         refused = subprocess.run(repeated, check=False, capture_output=True, text=True)
         assert refused.returncode == 2

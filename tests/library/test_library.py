@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -341,3 +342,11 @@ def test_symbols_header_and_python_name_the_same_functions():
     assert {line.split()[-1] for line in shown.splitlines()} == {f"polydem_{name}" for name in declared}
     assert declared == {*library.WITH_ERROR, *library.WITHOUT_ERROR}
     assert len(declared) <= 40
+
+
+def test_another_library_is_refused():
+    path = next(line.split()[-1] for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
+                if "/libc.so" in line)
+    done = subprocess.run([sys.executable, "-c", "import polydem; polydem.version()"], check=False, capture_output=True,
+                          text=True, env={**os.environ, "POLYDEM_LIBRARY": path})
+    assert f"PolydemError: {path} has no function polydem_" in done.stderr

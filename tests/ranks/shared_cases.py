@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import polydem
-from polydem.simulation import BODY_COLUMNS, CONTACT_COLUMNS
+from polydem.parts import BODY_COLUMNS, CONTACT_COLUMNS
 
 INPUTS = Path(__file__).parents[2] / "inputs"
 #: All processes of mpirun; None: there is one, without MPI

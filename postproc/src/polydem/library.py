@@ -90,7 +90,11 @@ def load(library: str = NAME) -> ctypes.CDLL:
 
 
 def _declare(library: ctypes.CDLL, name: str, result: Any, arguments: list[Any]) -> None:
-    function = getattr(library, f"polydem_{name}")
+    try:
+        function = getattr(library, f"polydem_{name}")
+    except AttributeError as error:
+        raise PolydemError(f"{library._name} has no function polydem_{name}: it is another library, or not of "
+                           "the version of this package") from error
     function.restype, function.argtypes = result, arguments
 
 
