@@ -258,7 +258,8 @@ class Build(Toy):
         find = "find_python() { echo " + f"'{machine}/python3'" + "; }"
         text = "\n".join(self.read("polydem")).replace('main "$@"', find + '\nmain "$@"')
         self.write("polydem", text + "\n")
-        os.remove(os.path.join(self.folder, ".venv", ".made"))
+        for name in (".made", ".made_manual", ".made_test"):
+            os.remove(os.path.join(self.folder, ".venv", name))
         self.assertEqual(self.call("plot", "result.h5")[0], 0)
         self.assertEqual(self.read("asked"), [asked, "-m polydem_post plot result.h5"])
         os.remove(os.path.join(self.folder, "asked"))
@@ -270,3 +271,16 @@ class Build(Toy):
         os.remove(os.path.join(self.folder, "asked"))
         self.assertEqual(self.call("test", "fine")[0], 0)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "asked")))
+        # What was added is kept when the requirements change, and when the folder has moved.
+        self.environment["POLYDEM_EXTRAS"] = "pictures,readers"
+        self.assertEqual(self.call("plot", "result.h5")[0], 0)
+        del self.environment["POLYDEM_EXTRAS"]
+        os.utime(os.path.join(self.folder, "postproc", "pyproject.toml"), (time.time() + 5,)*2)
+        self.assertEqual(self.call("plot", "result.h5")[0], 0)
+        os.utime(os.path.join(self.folder, "postproc", "pyproject.toml"), (0, 0))
+        self.write(".venv/.made", "/elsewhere\n")
+        self.assertEqual(self.call("plot", "result.h5")[0], 0)
+        self.assertEqual(self.call("plot", "result.h5")[0], 0)
+        plot, kept = "-m polydem_post plot result.h5", "[gsd,manual,pictures,readers,test]"
+        self.assertEqual(self.read("asked"), [asked + "[pictures,readers]", plot, asked + kept, plot, asked + kept,
+                                              plot, plot])
