@@ -3,7 +3,8 @@
 usage: check_instruction_sets.py BUILD      a built folder, with compile_commands.json
 
 A fused multiply-add rounds once where two operations round twice, so its bits differ from those of a processor without
-it; compilers emit it in spite of -ffp-contract=off (GCC bug 107647). Ends with code 77 (skipped) without objdump.
+it; compilers emit it in spite of -ffp-contract=off (GCC bug 107647). One file is compiled anew for a processor that has
+fused operations, as by FFLAGS=-march=native or by Spack. Ends with code 77 (skipped) without objdump.
 """
 
 import json
@@ -35,17 +36,17 @@ def is_wide(path):
 
 
 def objects_of(build):
-    """Paths of the objects of the layers and the program, and one command that compiles Fortran."""
+    """Paths of the objects of the layers and the program, and the entry of the file that turns vertices."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
         entries = json.load(file)
-    found, compiler = [], None
+    found, turns = [], None
     for entry in entries:
         words = shlex.split(entry["command"])
         path = os.path.join(entry["directory"], words[words.index("-o") + 1])
         if os.path.relpath(path, build).startswith("src" + os.sep) and path.endswith(".f90.o"):
             found.append(path)
-            compiler = words[0]
-    return found, compiler
+            turns = entry if os.path.basename(path) == "bodies.f90.o" else turns
+    return found, turns
 
 
 def faults_of(path, found):
@@ -67,10 +68,21 @@ def try_fused(compiler, folder):
     return done.returncode != 0 or len(list(faults_of(result, mnemonics(result)))) == 1
 
 
+def try_named_processor(entry, folder):
+    """Compile a file, as the build does, for a processor with fused operations: faults."""
+    compiler, *words = shlex.split(entry["command"])
+    result = os.path.join(folder, "bodies_avx2.f90.o")
+    words[words.index("-o") + 1] = result
+    # The modules of its layer are read where the build has them, and written elsewhere.
+    words = [word.replace("-J", "-I") if word.startswith("-J") else word for word in words]
+    subprocess.run([compiler, "-march=skylake-avx512", *words, f"-J{folder}"], check=True, cwd=entry["directory"])
+    return list(faults_of(result, mnemonics(result)))
+
+
 def main(build):
     if not shutil.which("objdump"):
         sys.exit(77)
-    objects, compiler = objects_of(build)
+    objects, turns = objects_of(build)
     found = {path: mnemonics(path) for path in objects}
     faults = [fault for path, names in found.items() for fault in faults_of(path, names)]
     if not any(map(is_wide, objects)):
@@ -79,8 +91,9 @@ def main(build):
         kernels = [path for path in objects if is_wide(path)]
         faults += [f"{path} has no AVX" for path in kernels if not any(map(AVX.fullmatch, found[path]))]
         with tempfile.TemporaryDirectory() as folder:
-            if not try_fused(compiler, folder):
+            if not try_fused(shlex.split(turns["command"])[0], folder):
                 faults.append("the check does not find a fused operation")
+            faults += try_named_processor(turns, folder)
     print(f"{len(objects)} objects, {sum(map(is_wide, objects))} for AVX2")
     for fault in faults:
         print(fault)

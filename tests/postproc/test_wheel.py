@@ -2,6 +2,7 @@
 but its dependencies.
 """
 
+import importlib
 import os
 import re
 import subprocess
@@ -128,12 +129,57 @@ def test_a_wheel_has_its_libraries_but_for_libgomp(installed):
     inside = {path.name.partition("-")[0] for path in (packages / "polydem.libs").iterdir()}
     assert {"libgfortran", "libhdf5_serial"} <= inside or {"libgfortran", "libhdf5"} <= inside
     assert "libgomp" not in inside
-    assert list(packages.glob("polydem-*.dist-info/LICENSE"))
     for path in (packages / "polydem/libpolydem.so.0", packages / "polydem/bin/polydem"):
         code, shown, _ = call_installed("ldd", path)
         assert code == 0 and "not found" not in shown
         place = Path(re.search(r"libgfortran\S* => (\S+)", shown)[1])
         assert place.resolve().parent == (packages / "polydem.libs").resolve()
+
+
+def test_a_wheel_has_the_licences_of_its_libraries(installed):
+    _, packages = installed
+    (licences,) = packages.glob("polydem-*.dist-info/licenses")
+    assert (licences / "LICENSE").read_text() == (ROOT / "LICENSE").read_text()
+    folder = licences / "libraries"
+    listed = dict(re.findall(r"(?m)^(lib\S+\.so\S*): (\S+) \S", (folder / "libraries.txt").read_text()))
+    assert set(listed) == {path.name for path in (packages / "polydem.libs").iterdir()}
+    for package in listed.values():
+        text = (folder / package / "copyright").read_text()
+        assert "Copyright" in text or "(c)" in text.lower()
+        for place in set(re.findall(r"/usr/share/(common-licenses/[A-Z][\w.-]*\w)", text)):
+            assert (folder / place).stat().st_size > 1000
+    assert "Version 3, 29 June 2007" in (folder / "common-licenses" / "GPL-3").read_text()
+    named = re.findall(r"(?m)^License-File: (.*)$", (licences.parent / "METADATA").read_text())
+    assert sorted(named) == sorted(path.relative_to(licences).as_posix() for path in licences.rglob("*")
+                                   if path.is_file())
+
+
+def test_a_library_without_a_licence_is_refused(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "src/packaging"))
+    licences = importlib.import_module("wheel_licences")
+    monkeypatch.setattr(licences, "debian_package", lambda library: "")
+    monkeypatch.setattr(licences, "COMMON", tmp_path / "common")
+    library = tmp_path / "lib" / "libthing-2.5.so.1"
+    documents, made = tmp_path / "share/doc/thing", tmp_path / "made"
+    documents.mkdir(parents=True)
+    known = {library.name: library}
+
+    def refused(name, words):
+        with pytest.raises(licences.LicenceError, match=words):
+            licences.add_bundled(made, [name], known)
+
+    refused("libother-0123abcd.so.1", r"neither program nor library loads libother\.so\.1")
+    refused("libthing-2-0123abcd.5.so.1", r"libthing-2\.5\.so\.1: no package of Debian has it")
+    (documents / "copyright").write_text("Of us. See /usr/share/common-licenses/{GPL-9,MIT}'.")
+    (documents / "version").write_text("thing 2.5-1\n")
+    refused("libthing-2-0123abcd.5.so.1", r"thing: its licence refers to \S+/common/\S+, which is not there")
+    (tmp_path / "common").mkdir()
+    for name in ("GPL-9", "MIT"):
+        (tmp_path / "common" / name).write_text("Do as you like.")
+    licences.add_bundled(made, ["libthing-2-0123abcd.5.so.1"], known)
+    assert {path.relative_to(made).as_posix() for path in made.rglob("*") if path.is_file()} == {
+        "libraries.txt", "thing/copyright", "common-licenses/GPL-9", "common-licenses/MIT"}
+    assert "libthing-2-0123abcd.5.so.1: thing 2.5-1" in (made / "libraries.txt").read_text()
 
 
 def test_a_library_that_cannot_be_loaded_is_named(tmp_path):
