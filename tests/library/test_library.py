@@ -344,6 +344,12 @@ def test_symbols_header_and_python_name_the_same_functions():
     assert len(declared) <= 40
 
 
+def test_a_notebook_draws_a_simulation():
+    with simulation("heap") as sim:
+        sim.run(100)
+        assert sim._repr_png_() == sim.frame()._repr_png_() != b""
+
+
 def test_another_library_is_refused():
     path = next(line.split()[-1] for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
                 if "/libc.so" in line)

@@ -1,5 +1,6 @@
 """Pictures of frames: quantities, overlays, cells of the quadtree, layout and files."""
 
+import io
 import re
 from dataclasses import replace
 
@@ -147,6 +148,14 @@ def test_a_bar_of_a_round_length_stands_in_place_of_the_axes(run, small_drum, tm
         [0.05, 0.02, 1.0, 0.5, 5e5, 2e-7])
     assert [length_text(length) for length in (2e3, 5.0, 0.5, 1e-3, 2e-5, 5e-8)] == [
         "2 km", "5 m", "500 mm", "1 mm", "20 µm", "5e-08 m"]
+
+
+def test_a_notebook_draws_a_frame(run):
+    shown = imread(io.BytesIO(run[-1]._repr_png_()))
+    figure = plot_frames(run, [len(run) - 1])
+    figure.canvas.draw()
+    wanted = np.asarray(figure.canvas.buffer_rgba())
+    assert np.array_equal(np.round(255 * shown).astype(int), wanted)
 
 
 def test_a_frame_is_drawn_into_axes_of_ones_own(run):

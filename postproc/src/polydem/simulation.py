@@ -108,6 +108,10 @@ class Simulation(Strict):
         return (f"<Simulation: t = {self.time:.6g} s, step {self.step} of {self.n_steps}, {len(self.bodies)} bodies, "
                 f"{last}>")
 
+    def _repr_png_(self) -> Any:
+        """The present state in a notebook."""
+        return self.frame()._repr_png_()
+
     def close(self) -> None:
         """End the run, complete its files and free its memory; a second call does nothing."""
         self._handle.close()

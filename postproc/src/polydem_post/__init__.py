@@ -26,3 +26,13 @@ __version__ = "0.1.0"
 #: The subpackages and modules, lowest first
 LAYERS = ("base", "outlines", "tracing", "bodies_file", "read", "analysis", "pictures", "export", "sweep", "accuracy",
           "command_line", "manual")
+
+
+def _draw(frame: Frame) -> bytes:
+    """A frame as a notebook draws it."""
+    from .pictures.plot import picture
+
+    return picture(frame)
+
+
+Frame._repr_png_ = _draw

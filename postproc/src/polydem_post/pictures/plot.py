@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
 from collections.abc import Sequence
@@ -46,16 +47,27 @@ def plot_frames(trajectory: Trajectory, numbers: list[int], look: Look | None = 
                 columns: int | None = None, dpi: float = DPI) -> Figure:
     """Draw frames in one figure on one scale of colours and lengths; `size` is its width and height [mm]."""
     settled = drawing.settle(trajectory, numbers, look or Look())
-    frames = [trajectory[number] for number in numbers]
-    columns = min(columns or _columns(len(numbers), settled), len(numbers))
-    rows = -(-len(numbers) // columns)
+    return _figure([trajectory[number] for number in numbers], settled, size, columns, dpi)
+
+
+def picture(frame: Frame) -> bytes:
+    """A frame as notebooks show it: PNG, coloured by the speed."""
+    file = io.BytesIO()
+    figure = _figure([frame], drawing.settle_frames(frame, [frame], Look()), None, None, DPI)
+    figure.savefig(file, format="png")
+    return file.getvalue()
+
+
+def _figure(frames: list[Frame], settled: SettledLook, size: tuple | None, columns: int | None, dpi: float) -> Figure:
+    columns = min(columns or _columns(len(frames), settled), len(frames))
+    rows = -(-len(frames) // columns)
     width, height = size or _size(settled, rows, columns)
     figure = Figure(figsize=(width / INCH, height / INCH), dpi=dpi, layout="compressed")
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
-    for axis in axes[len(numbers) :]:
+    for axis in axes[len(frames) :]:
         axis.remove()
-    axes = axes[: len(numbers)]
+    axes = axes[: len(frames)]
     for place, (axis, frame) in enumerate(zip(axes, frames)):
         prepare(axis, settled, f"t = {frame.time:.4g} s")
         if settled.scale_bar and place == (rows - 1) * columns:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -105,6 +106,8 @@ class Frame:
     cell_size: FloatArray = field(default_factory=lambda: np.zeros(2))
     jump: float = 0.0
     _source: FrameSource | None = field(default=None)
+    #: What a notebook draws, as PNG; pictures are a layer above, so the package sets it
+    _repr_png_: ClassVar[Callable[[Frame], bytes]]
 
     def __post_init__(self) -> None:
         """Bodies without materials have number 0."""
