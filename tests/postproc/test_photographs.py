@@ -97,7 +97,7 @@ def test_convex_grains_are_their_hulls(tmp_path):
 
 
 def test_small_dents_make_no_pieces(tmp_path):
-    """A disc with a noisy edge is one piece of the area of the picture; without hulls it had several."""
+    """A disc with a noisy edge is one piece, with the area that it has in the picture."""
     angle = 2 * np.pi * np.arange(200) / 200
     rough = 40 * (1 + 0.012 * np.random.default_rng(0).standard_normal(200))
     outline = np.stack([60 + rough * np.cos(angle), 60 + rough * np.sin(angle)], axis=1)

@@ -105,7 +105,7 @@ def _at_other_thresholds(level: FloatArray, step: FloatArray, choices: Tracing, 
     others = [_grains(level + sign * step, choices, []) for sign in (1.0, -1.0)]
     area = [100.0 * ((other > 0).sum() / max((label > 0).sum(), 1) - 1.0) for other in others]
     number = [len(np.unique(other[other > 0])) for other in others]
-    words = " and ".join(f"{change + 0.0:+.1f} % (grains: {count})" for change, count in zip(area, number))
+    words = " and ".join(f"{round(change, 1) + 0.0:+.1f} % (grains: {count})" for change, count in zip(area, number))
     return (f"accuracy of the threshold: {float(np.median(step)):.2g} grey values ({100 * STEP:g} % of the difference "
             f"between the means of the two sorts of pixels) nearer to the background, or farther from it, change the "
             f"total area of all grains by {words}")

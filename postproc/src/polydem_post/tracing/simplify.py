@@ -30,17 +30,16 @@ def simplified(numbers: list[IntArray], places: list[FloatArray], tolerance: Flo
     """Outlines whose distance from the given ones is at most a tolerance of each grain; [tolerance] = [places].
 
     Lines between nodes, where three lines meet, are simplified once (Douglas & Peucker, Cartographica 10 (1973) 112)
-    with the tolerance of the smaller of the grains on their sides; dents of less than the tolerance are filled. A grain
-    that touches none becomes its convex hull if that is within the tolerance; with `convex` every grain does, whatever
-    the distance, unless its hull meets another grain. The second list tells which became their hulls.
+    with the tolerance of the smaller of the grains on their sides; dents of less than the tolerance are filled. With
+    `convex` each grain becomes its convex hull, whatever the distance, unless the hull meets another grain; the second
+    list tells which did.
     """
     shapely = need("shapely", "pictures", "the import of pictures")
     steps = [1 if area_of(each) > 0.0 else -1 for each in places]
     places = [each[::step] for each, step in zip(places, steps)]
     numbers = [each[::step] for each, step in zip(numbers, steps)]
     chains, parts, point, lone = _chains(numbers, places)
-    hulls = [_hull(shapely, place, each, convex) if convex or free else None
-             for place, each, free in zip(places, tolerance, lone)]
+    hulls = [_hull(shapely, place, each) if convex else None for place, each in zip(places, tolerance)]
     outlines = _solved(shapely, places, tolerance, chains, parts, point, lone, hulls)
     return outlines, [each is not None for each in hulls]
 
@@ -73,26 +72,14 @@ def _solved(shapely: Any, places: list[FloatArray], tolerance: FloatArray, chain
     return outlines
 
 
-def _hull(shapely: Any, place: FloatArray, tolerance: float, convex: bool) -> FloatArray | None:
-    """The convex hull of a grain with fewer corners; None if it is farther than the tolerance, unless with `convex`.
-
-    With `convex` the area is that of the hull, else that of the grain.
-    """
+def _hull(shapely: Any, place: FloatArray, tolerance: float) -> FloatArray:
+    """The convex hull of a grain, with fewer corners but its area."""
     exact = shapely.get_coordinates(shapely.convex_hull(shapely.Polygon(place)))[:-1]
     exact = exact if area_of(exact) > 0.0 else exact[::-1]
-    if convex:
-        place = exact
-    ring = shapely.LinearRing(place)
     begin = int(np.argmax(np.hypot(*(exact - exact.mean(axis=0)).T)))
     closed = np.roll(exact, -begin, axis=0)[[*range(len(exact)), 0]]
-    for part in (1.0, 0.7, 0.4, 0.1):
-        line = shapely.get_coordinates(shapely.simplify(shapely.LineString(closed), part * tolerance))[:-1]
-        if len(line) < 3:
-            continue
-        outline = with_area(shapely, line, place, tolerance)
-        if shapely.hausdorff_distance(shapely.LinearRing(outline), ring) <= tolerance:
-            return outline
-    return exact if convex else None
+    line = shapely.get_coordinates(shapely.simplify(shapely.LineString(closed), tolerance, preserve_topology=False))
+    return with_area(shapely, line[:-1], exact, tolerance) if len(line) > 3 else exact
 
 
 def with_area(shapely: Any, outline: FloatArray, exact: FloatArray, tolerance: float) -> FloatArray:

@@ -59,8 +59,8 @@ def above_threshold(source: Picture, choices: Tracing, said: list[str]) -> tuple
 def _of_each_pixel(source: Picture, grey: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
     """The middle between the means of the two sorts of pixels around each pixel, and a step of it.
 
-    The means have the weights of a Gaussian. The sorts are first those of Otsu above a morphological opening, which
-    no grain enters, then those of the threshold of the round before.
+    The means are over a square, three times, which is nearly a Gaussian of half the width. The sorts are first those
+    of Otsu above a morphological opening, which no grain enters, then those of the threshold of the round before.
     """
     from scipy import ndimage
 
@@ -70,11 +70,12 @@ def _of_each_pixel(source: Picture, grey: FloatArray, width: float) -> tuple[Flo
                           f"{grey.shape[0]} pixels")
 
     def around(values: FloatArray) -> FloatArray:
-        found: FloatArray = ndimage.gaussian_filter(values, 0.5 * width, mode="nearest")
-        return found
+        for _ in range(3):
+            values = ndimage.uniform_filter(values, round(width), mode="nearest")
+        return values
 
     opened = ndimage.grey_opening(grey, size=(round(width), round(width)), mode="nearest")
-    above = grey - ndimage.gaussian_filter(opened, 0.25 * width, mode="nearest")
+    above = grey - ndimage.uniform_filter(opened, round(width), mode="nearest")
     bright = above > filters.threshold_otsu(above)
     for _ in range(ROUNDS):
         behind = around(np.where(bright, 0.0, grey)) + FAR_DARK * grey[~bright].mean()
