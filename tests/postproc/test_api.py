@@ -293,7 +293,7 @@ def test_no_frames_make_no_table(run, call):
                                            ("pandas", "run.to_pandas()"), ("pandas", "run[0].contacts.to_pandas()")])
 def test_a_missing_package_is_named(run, monkeypatch, package, call):
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(ResultError, match=rf"needs the package {package}: install it with pip install {package}"):
+    with pytest.raises(ResultError, match=rf"the package {package}: install it with \S+ -m pip install {package}, or"):
         eval(call, {"run": run})
 
 

@@ -283,7 +283,7 @@ def features(*properties):
     ("a.wkt", "POLYGON EMPTY", "a.wkt:1: the polygon is empty; remove this line"),
     ("a.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 9), (1 1, 2 1, 2 2))", "a.wkt:1: the polygon has a hole"),
     ("a.wkt", "", "a.wkt: holds no polygons"),
-    ("a.wkt", "POLYGON ((0 0, 1e200 0, 0 1))", "a.wkt:1: the outline cannot be a body: a coordinate is beyond 1e+50 m"),
+    ("a.wkt", "POLYGON ((0 0, 1e200 0, 0 1))", "a.wkt:1: would be 1e+200 m across with --scale 1; bodies have 1e-09"),
     ("a.json", "{", "a.json:1: is not JSON"),
     ("a.json", "[" * 100000, "a.json: its lists are nested too deeply"),
     ("a.json", '{"type": "Feature", "geometry": null}', "a.json: has no geometry"),

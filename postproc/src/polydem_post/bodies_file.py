@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +15,9 @@ import numpy as np
 from .base.convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .base.new_file import NewHdf5, new_file
 from .base.polygons import FloatArray, IntArray, join, thicknesses
-from .base.result_file import ResultError, cannot_write, reading_any
+from .base.result_file import ResultError, reading_any
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
-from .tracing import FORMAT_OF_SUFFIX, Tracing, trace
+from .tracing import FORMAT_OF_SUFFIX, Traced, Tracing, trace
 
 #: What becomes the origin of a bodies file: a point (x, y) [m], the centre of the polygons, or nothing
 Origin = Optional[Union[str, tuple[float, float]]]
@@ -32,39 +33,94 @@ MEANINGS = {"fixed": "true or false", "id": "a whole number from 0 to 2147483647
 #: density.
 INFINITE = {"mass": 0.0, "inertia": 0.0, "density": 2500.0}
 
+#: How names of bodies files end
+SUFFIXES = (".h5", ".hdf5")
+#: Sizes of bodies that are imported [m]
+SMALLEST, GREATEST = 1e-9, 1e6
+#: Pieces of most grains above which a picture is rough
+MANY_PIECES = 10
 
-def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], *, form: str = "", scale: float = 1.0,
-                  fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False,
-                  origin: Origin = None, tracing: Tracing | None = None,
+
+def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], *, form: str = "",
+                  scale: float | None = None, fixed: Iterable[int] = (), decomposed: bool = False,
+                  overwrite: bool = False, origin: Origin = None, tracing: Tracing | None = None,
                   say: Callable[[str], None] | None = None) -> int:
     """Make a bodies file of the polygons of a file (WKT, GeoJSON, plain text); return the number of bodies.
 
     Pictures and drawings (DXF, SVG) are traced with the choices of `tracing`, and `say` gets sentences on what
     was found and what errors the simplification made. Grains of pictures are decomposed in any case.
 
-    Coordinates are multiplied by `scale` to give metres, then `origin` is subtracted as in `write_bodies`. `fixed` are
-    numbers of outlines in the file, from 1. A concave outline is an error, or with `decomposed` becomes a body of
-    several convex pieces.
+    Coordinates are multiplied by `scale` to give metres (default: 1), then `origin` is subtracted as in
+    `write_bodies`. `fixed` are numbers of outlines in the file, from 1. A concave outline is an error, or with
+    `decomposed` becomes a body of several convex pieces. `form` is wkt, geojson, text, picture, dxf or svg, if the name
+    of the file does not say it.
     """
-    if Path(output).exists() and Path(output).samefile(path):
+    source = Path(path)
+    if Path(output).exists() and Path(output).samefile(source):
         raise ResultError(f"{output}: is the file that is imported; choose another name")
-    traced = "" if form else FORMAT_OF_SUFFIX.get(Path(path).suffix.lower(), "")
-    if traced:
-        found = trace(Path(path), tracing or Tracing(), scale)
-        outlines, decomposed = found.outlines, decomposed or traced == "picture"
-    else:
-        outlines = read_outlines(Path(path), form)
-        (tracing or Tracing()).insist_on(path, (), "polygons")
-    count = write_bodies(outlines, output, scale=scale, fixed=fixed, decomposed=decomposed, overwrite=overwrite,
-                         origin=origin)
-    if traced and say:
-        for sentence in found.said:
-            say(sentence)
-        body, thickness = _thicknesses(output)
-        thinnest = outlines[body[np.argmin(thickness)]].place.removeprefix(f"{path}: ")
-        say(f"pieces: {len(body)}; thickness of the thinnest: {thickness.min():.3g} m ({thinnest}), which the time "
-            f"step follows; of the 10 % thinnest at most {np.quantile(thickness, 0.1):.3g} m")
+    _insist_on_place(Path(output))
+    form = form or FORMAT_OF_SUFFIX.get(source.suffix.lower(), "")
+    options: dict[str, Any] = {"fixed": fixed, "overwrite": overwrite, "origin": origin}
+    if form in FORMAT_OF_SUFFIX.values():
+        found = trace(source, tracing or Tracing(), scale, form)
+        return _write_traced(found, output, scale, say, decomposed=decomposed or form == "picture", **options)
+    outlines = read_outlines(source, form)
+    (tracing or Tracing()).insist_on(path, (), "polygons")
+    _insist_on_size(outlines, scale)
+    return write_bodies(outlines, output, scale=1.0 if scale is None else scale, decomposed=decomposed, **options)
+
+
+def import_array(values: Any, output: str | os.PathLike[str], *, scale: float | None = None,
+                 tracing: Tracing | None = None, say: Callable[[str], None] | None = None, **options: Any) -> int:
+    """Make a bodies file of a labelled picture, an array of integers (rows, columns), as `import_bodies` of a file.
+
+    0 is no grain. With a threshold among the choices of `tracing` the array has grey values. The last row is the
+    lower edge, y = 0. The other options are `fixed`, `overwrite` and `origin`.
+    """
+    _insist_on_place(Path(output))
+    found = trace(np.asarray(values), tracing or Tracing(), scale)
+    return _write_traced(found, output, scale, say, decomposed=True, **options)
+
+
+def _write_traced(found: Traced, output: str | os.PathLike[str], scale: float | None,
+                  say: Callable[[str], None] | None, **options: Any) -> int:
+    """Write what was traced, and say how."""
+    _insist_on_size(found.outlines, scale)
+    count = write_bodies(found.outlines, output, scale=1.0 if scale is None else scale, **options)
+    body, thickness = _thicknesses(output)
+    pieces = np.bincount(body)
+    names = [outline.place.rpartition(": ")[2] for outline in found.outlines]
+    for sentence in found.said if say else []:
+        say(sentence)  # type: ignore[misc]
+    if say:
+        most = f", at most {pieces.max()} of a body ({names[int(np.argmax(pieces))]})" if pieces.max() > 1 else ""
+        say(f"pieces: {len(body)}{most}; thickness of the thinnest: {thickness.min():.3g} m "
+            f"({names[body[np.argmin(thickness)]]}), which the time step follows; of the 10 % thinnest at most "
+            f"{np.quantile(thickness, 0.1):.3g} m")
+    if np.median(pieces) > MANY_PIECES:
+        warnings.warn(f"{len(body)} pieces for {count} bodies, so outlines are rough: smooth a grey picture more "
+                      "(--smooth), or take a greater --tolerance, or --convex", stacklevel=3)
     return count
+
+
+def _insist_on_place(path: Path) -> None:
+    """Refuse a name for a bodies file that cannot be written, before the work."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise ResultError(f"{path}: cannot be written: the name must end with {' or '.join(SUFFIXES)}")
+    if not path.parent.is_dir():
+        raise ResultError(f"{path}: cannot be written (there is no folder {path.parent})")
+
+
+def _insist_on_size(outlines: list[Outline], scale: float | None) -> None:
+    """Refuse bodies of sizes that no scale in metres gives."""
+    factor = 1.0 if scale is None else scale
+    for outline in outlines if np.isfinite(factor) and factor > 0.0 else []:
+        if not (outline.points.ndim == 2 and np.isfinite(outline.points).all()):
+            continue
+        size = factor * float(np.ptp(outline.points, axis=0).max())
+        if size > 0.0 and not SMALLEST <= size <= GREATEST:
+            raise ResultError(f"{outline.place}: would be {size:.3g} m across with --scale {factor:g}; bodies have "
+                              f"{SMALLEST:g} to {GREATEST:g} m")
 
 
 def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: Any) -> int:
@@ -225,7 +281,9 @@ def _pieces(outline: Outline, scale: float, shift: FloatArray, decomposed: bool)
             return [points]
         insist_on_simple(points)
         if not decomposed:
-            vertex = ", ".join(repr(float(x)).removesuffix(".0") for x in (points[wrong[0]] + shift) / scale)
+            x, y = (points[wrong[0]] + shift) / scale
+            vertex = ", ".join(repr(float(each)).removesuffix(".0")
+                               for each in (x, y if outline.down is None else outline.down - y))
             raise OutlineError(f"it is concave at the vertex ({vertex}); --decompose makes a body of "
                                "several convex pieces of it")
         return decompose(points)
@@ -277,10 +335,6 @@ def _material_column(rows: list[dict[str, Any]], places: list[str]) -> list[str]
 
 def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any], origin: FloatArray | None) -> None:
     vertex, start = join(polygons)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise cannot_write(path, error) from error
     with new_file(path) as part, NewHdf5(part) as file:
         file["vertex"], file["vertex_start"] = vertex, start
         materials = columns.pop("material", None)

@@ -41,6 +41,8 @@ class Outline:
     properties: dict[str, Any] = field(default_factory=dict)
     #: What a message adds if the outline cannot be a body
     hint: str = ""
+    #: The y of the file that became 0, if y points down there; None: points are those of the file
+    down: float | None = None
 
 
 def read_outlines(path: Path, form: str = "") -> list[Outline]:
@@ -50,8 +52,8 @@ def read_outlines(path: Path, form: str = "") -> list[Outline]:
         raise ResultError(f"{path}: import reads polygons, {', '.join(READERS)}, but this is "
                           f"{OTHER_FORMATS[path.suffix.lower()]}")
     if form not in READERS:
-        raise ResultError(f"{path}: its name does not say the format; give --from "
-                          f"{', '.join(READERS)}")
+        raise ResultError(f"{path}: its name does not say the format; give --from {', '.join(READERS)}, picture, dxf "
+                          "or svg")
     try:
         insist_on_file(path)
         text = path.read_text(encoding="utf-8-sig")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import shlex
+import sys
 from typing import Any
 
 from .result_file import ResultError
@@ -14,5 +16,6 @@ def need(package: str, extra: str, purpose: str, project: str = "") -> Any:
     try:
         return importlib.import_module(package)
     except ImportError as error:
-        raise ResultError(f"{purpose} needs the package {project}: install it with pip install {project}, or with "
-                          f"pip install 'polydem[{extra}]'") from error
+        pip = f"{shlex.quote(sys.executable)} -m pip install"
+        raise ResultError(f"{purpose} needs the package {project}: install it with {pip} {project}, or all for this "
+                          f"with {pip} 'polydem[{extra}]'") from error

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.emit import FORMATS
+from ..base.new_file import insist_on_own
 from ..base.result_file import ResultError
 from ..read.timing_table import timing_table
 from ..read.trajectory import Trajectory
@@ -42,18 +43,22 @@ def add_data_verbs(verbs: Any) -> None:
     bodies.set_defaults(action=_import)
     bodies.add_argument("file", type=Path, metavar="FILE")
     bodies.add_argument("-o", "--output", type=Path, required=True, metavar="BODIES.h5")
-    bodies.add_argument("--from", choices=("wkt", "geojson", "text"), dest="form", metavar="FORMAT")
-    bodies.add_argument("--scale", type=float, default=1.0, metavar="S")
+    bodies.add_argument("--from", choices=("wkt", "geojson", "text", "picture", "dxf", "svg"), dest="form",
+                        metavar="FORMAT")
+    bodies.add_argument("--scale", type=float, metavar="S")
+    bodies.add_argument("--picture", type=Path, metavar="FILE")
     bodies.add_argument("--origin", type=_origin, metavar="ORIGIN")
     bodies.add_argument("--fixed", type=numbers, default=[], metavar="A,B,C")
     bodies.add_argument("--decompose", action="store_true")
     bodies.add_argument("--tolerance", type=float, metavar="T")
     bodies.add_argument("--threshold", type=_threshold, metavar="GREY")
     bodies.add_argument("--dark", action="store_true", default=None)
+    bodies.add_argument("--uneven", type=float, metavar="PIXELS")
     bodies.add_argument("--smooth", type=float, metavar="PIXELS")
     bodies.add_argument("--split", type=float, nargs="?", const=SPLIT, metavar="SHARE")
     bodies.add_argument("--least", type=float, metavar="PIXELS")
     bodies.add_argument("--border", action="store_true", default=None)
+    bodies.add_argument("--convex", action="store_true", default=None)
     bodies.add_argument("--force", action="store_true")
 
 
@@ -106,20 +111,31 @@ def _progress(done: int, total: int) -> None:
 
 def _import(options: argparse.Namespace) -> None:
     from ..bodies_file import import_bodies, origin_of, pieces_of
+    from ..pictures.imported import draw_import
+    from ..pictures.plot import check_form, save
     from ..tracing import Tracing
 
-    if not np.isfinite(options.scale):
+    if options.scale is not None and not np.isfinite(options.scale):
         raise ResultError("--scale takes a number above 0")
+    if options.picture:
+        check_form(options.picture)
+        insist_on_own(options.picture)
     tracing = Tracing(options.tolerance, options.threshold, options.dark, options.smooth, options.split, options.least,
-                      options.border)
+                      options.border, options.uneven, options.convex)
+    told: list[str] = []
     n = import_bodies(options.file, options.output, form=options.form or "", scale=options.scale, fixed=options.fixed,
                       decomposed=options.decompose, overwrite=options.force, origin=options.origin, tracing=tracing,
-                      say=lambda sentence: say(f"{options.file}: {sentence}"))
+                      say=told.append)
+    for sentence in told:
+        say(f"{options.file}: {sentence}")
+    if options.picture:
+        save(draw_import(options.file, options.output, form=options.form or "", scale=options.scale), options.picture)
+        say(f"{options.picture}: the outlines of the bodies")
     if options.origin is not None:
         x, y = origin_of(options.output)
         print(f"{options.output}: its origin is at ({x!r}, {y!r}) m; export adds this to the coordinates")
     several, most, thinnest = pieces_of(options.output)
-    if several:
+    if several and not told:
         print(f"{options.output}: bodies of several pieces: {several}; most pieces of a body: {most}; thickness of the "
               f"thinnest piece: {thinnest:.3g} m, which makes the time step short if it is small")
     bodies, quoted = "1 body" if n == 1 else f"{n} bodies", str(options.output).replace("'", "''")

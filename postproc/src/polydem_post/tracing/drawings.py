@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as Xml
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from io import StringIO
@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from ..base.optional import need
-from ..base.polygons import FloatArray, area_of
+from ..base.polygons import FloatArray
 from ..base.result_file import ResultError, cannot_read, insist_on_file
+from .lines import Line, Lines
 
 EXTRA = "pictures"
-#: Lines that end closer to their begin than this share of their size are closed
-CLOSED = 1e-6
 #: Deepest bisection of a curve: 4096 chords
 DEEPEST = 12
 #: Parts of SVG that are not drawn themselves
@@ -31,18 +30,20 @@ class Drawing:
     """The closed lines of a drawing."""
 
     #: The points of each line for a greatest distance of the chords from its curves, y up
-    lines: list[Callable[[float], FloatArray]]
+    lines: list[Line]
     #: Where each line is, for messages
     places: list[str]
     #: What was left out, and the units, in sentences
     said: list[str]
+    #: The y of a file, where it points down, that became 0
+    bottom: float | None = None
 
 
-def read_drawing(path: Path) -> Drawing:
+def read_drawing(path: Path, form: str) -> Drawing:
     """The closed lines of a DXF or SVG file."""
     try:
         insist_on_file(path)
-        drawing = _read_dxf(path) if path.suffix.lower() == ".dxf" else _read_svg(path)
+        drawing = _read_dxf(path) if form == "dxf" else _read_svg(path)
     except (OSError, UnicodeDecodeError) as error:
         raise cannot_read(path, error) from error
     if not drawing.lines:
@@ -57,23 +58,20 @@ def _read_dxf(path: Path) -> Drawing:
         document = ezdxf.readfile(path)
     except ezdxf.DXFError as error:
         raise ResultError(f"{path}: is not DXF that ezdxf reads ({error})") from error
-    lines: list[Callable[[float], FloatArray]] = []
-    places = []
-    left: dict[str, int] = {}
+    lines = Lines()
     for entity in _entities(document.modelspace()):
         kind = entity.dxftype()
         try:
             shape = ezdxf.path.make_path(entity)
         except (TypeError, ValueError):
             shape = None
-        if shape is None or not len(shape) or not _is_closed(_of_dxf(shape, None)):
-            left[kind] = left.get(kind, 0) + 1
-            continue
-        lines.append(partial(_of_dxf, shape))
-        places.append(f"{path}: {kind} {entity.dxf.handle}")
+        if shape is None or not len(shape):
+            lines.leave(kind)
+        else:
+            lines.add(partial(_of_dxf, shape), kind, f"{kind} {entity.dxf.handle}")
     unit = ezdxf.units.unit_name(document.units) if document.units else "not given"
     metres = ezdxf.units.conversion_factor(document.units, ezdxf.units.M) if document.units else None
-    return Drawing(lines, places, _said(left, f"unit of the file: {unit}", metres))
+    return _drawing(path, lines, f"unit of the file: {unit}", metres)
 
 
 def _entities(layout: Any) -> Iterator[Any]:
@@ -103,24 +101,22 @@ def _read_svg(path: Path) -> Drawing:
     size = {name: root.attrib.pop(name, "") for name in ("width", "height", "viewBox")}
     top, metres = _sheet(size)
     text = StringIO(Xml.tostring(root, encoding="unicode"))
-    lines: list[Callable[[float], FloatArray]] = []
-    places = []
-    left: dict[str, int] = {}
+    lines = Lines()
     try:
-        shapes = [each for each in elements.SVG.parse(text, reify=False).elements()
-                  if isinstance(each, elements.Shape) and each.values.get("visibility") != "hidden"]
-        for number, shape in enumerate(shapes, 1):
+        drawn = [each for each in elements.SVG.parse(text, reify=False).elements()
+                 if getattr(each, "values", None) and each.values.get("visibility") != "hidden"]
+        for each in drawn:
+            if isinstance(each, (elements.Text, elements.Image)):
+                lines.leave(type(each).__name__.lower())
+        for number, shape in enumerate((each for each in drawn if isinstance(each, elements.Shape)), 1):
             whole = abs(elements.Path(shape))
             for segments in ([*each] for each in whole.as_subpaths()):
-                if not _is_closed(_of_svg(elements, segments, top, None)):
-                    left[type(shape).__name__] = left.get(type(shape).__name__, 0) + 1
-                    continue
-                lines.append(partial(_of_svg, elements, segments, top))
-                places.append(f"{path}: {shape.id or f'{type(shape).__name__} {number}'}")
+                kind = type(shape).__name__
+                lines.add(partial(_of_svg, elements, segments, top), kind, shape.id or f"{kind} {number}")
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ResultError(f"{path}: is not SVG that svgelements reads ({error})") from error
     unit = f"size of the sheet: {size['width'] or 'not given'} for {_number_of_units(size)} units"
-    return Drawing(lines, places, _said(left, unit, metres))
+    return _drawing(path, lines, unit, metres, top)
 
 
 def _number_of_units(size: dict[str, str]) -> str:
@@ -173,18 +169,17 @@ def _curve(segment: Any, distance: float | None) -> list[tuple[float, float]]:
     return point[1:]
 
 
-def _is_closed(points: FloatArray) -> bool:
-    """Whether a line ends where it begins, and encloses an area."""
-    if len(points) < 4:
-        return False
-    size = float(np.ptp(points, axis=0).max())
-    return float(np.hypot(*(points[0] - points[-1]))) <= CLOSED * size and abs(area_of(points)) > 1e-12 * size**2
-
-
-def _said(left: dict[str, int], unit: str, metres: float | None) -> list[str]:
-    """What is to be said of a drawing."""
+def _drawing(path: Path, lines: Lines, unit: str, metres: float | None, bottom: float | None = None) -> Drawing:
+    """The closed lines, with those that separate lines make, and what is to be said of them."""
+    count, kinds = lines.join()
     said = [f"{unit}, 1 unit = {metres:.6g} m" if metres else unit]
-    if left:
-        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(left.items()))
-        said.append(f"left out, since they are no closed lines: {kinds}")
-    return said
+    if count:
+        said.append(f"of these joined of separate lines, end to end: {count}, of {_counted(kinds)}")
+    if lines.left:
+        said.append(f"left out, since they are no closed lines: {_counted(lines.left)}")
+    return Drawing(lines.closed, [f"{path}: {place}" for place in lines.places], said, bottom)
+
+
+def _counted(kinds: dict[str, int]) -> str:
+    """Numbers of lines by their kinds."""
+    return ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))

@@ -11,9 +11,13 @@ import numpy.typing as npt
 
 from ..base.optional import need
 from ..base.polygons import FloatArray, IntArray
-from ..base.result_file import ResultError, cannot_read, insist_on_file
+from ..base.result_file import ResultError
 from .choices import Tracing
+from .picture_files import Picture, name_of, read_picture
+from .thresholds import STEP, above_threshold
 
+#: Share of the picture above which what the border cuts may be the background
+SUSPECT = 0.1
 #: Pixels that a grain has at least, unless it is chosen
 LEAST = 100
 #: Suffixes of pictures whose compression changes the values of pixels
@@ -37,21 +41,23 @@ def skimage(part: str) -> Any:
     return need(f"skimage.{part}", "pictures", "the import of pictures", "scikit-image")
 
 
-def read_labels(path: Path, choices: Tracing) -> Labels:
-    """The grains of a picture file."""
-    measure = skimage("measure")
-    values, level, said = _labelled(path) if choices.threshold is None else _grey(path, choices)
-    label = measure.label(values, connectivity=1, background=0).astype(np.int64)
-    if level is not None and choices.split is not None:
-        before = label.max()
-        label = _split(label, choices.split)
-        said.append(f"grains after the cuts of narrow necks: {label.max()}, before: {before}")
-    if level is None and label.max() > 0 and label.max() > 0.05 * label.size:
-        raise ResultError(f"{path}: has {label.max()} regions of one value on {label.size} pixels, so it is no "
-                          "labelled picture; give --threshold for a grey one")
-    label = _chosen(label, choices, said)
+def read_labels(source: Picture, choices: Tracing) -> Labels:
+    """The grains of a picture file or of an array."""
+    said: list[str] = []
+    if choices.threshold is None:
+        level = None
+        label = _label(_labelled(source))
+        if label.max() > 0.05 * label.size:
+            raise ResultError(f"{name_of(source)}: has {label.max()} regions of one value on {label.size} pixels, so "
+                              "it is no labelled picture; give --threshold for a grey one")
+        label = _chosen(label, choices, said)
+    else:
+        level, step = above_threshold(source, choices, said)
+        label = _grains(level, choices, said)
+        said.append(_at_other_thresholds(level, step, choices, label))
     if not label.any():
-        raise ResultError(f"{path}: no grains are left: {'; '.join(said)}")
+        raise ResultError(f"{name_of(source)}: no grains are left: "
+                          f"{'; '.join(said) or 'every pixel has the value 0 or is black'}")
     padded = np.pad(label, 1)
     if level is not None:
         # The line between a grain and the outside is the edge of the picture.
@@ -61,61 +67,48 @@ def read_labels(path: Path, choices: Tracing) -> Labels:
     return Labels(padded, level, said)
 
 
-def _opened(path: Path) -> Any:
-    """A picture of Pillow."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        insist_on_file(path)
-        picture = Image.open(path)
-        picture.load()
-    except UnidentifiedImageError as error:
-        raise ResultError(f"{path}: is not a picture that Pillow knows") from error
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise cannot_read(path, error) from error
-    if getattr(picture, "n_frames", 1) > 1:
-        raise ResultError(f"{path}: has {picture.n_frames} pictures; give a file with one")
-    return picture
+def _label(values: npt.NDArray[Any]) -> IntArray:
+    """Connected regions of one value, numbered from 1."""
+    found: IntArray = skimage("measure").label(values, connectivity=1, background=0).astype(np.int64)
+    return found
 
 
-def _labelled(path: Path) -> tuple[IntArray, None, list[str]]:
+def _labelled(source: Picture) -> IntArray:
     """The value of each pixel; each colour is one, and black and transparent pixels are 0."""
-    if path.suffix.lower() in LOSSY:
-        raise ResultError(f"{path}: JPEG changes the values of pixels, so it has no labels; give --threshold, or a PNG")
-    picture = _opened(path)
-    if picture.mode in ("RGB", "RGBA", "LA", "PA", "CMYK"):
-        colour = np.asarray(picture.convert("RGBA"), dtype=np.int64)
-        values = np.where(colour[..., 3] > 0, colour[..., 0] << 16 | colour[..., 1] << 8 | colour[..., 2], 0)
-    else:
-        values = np.asarray(picture)
-        if values.dtype.kind == "f" and not (values == np.round(values)).all():
-            raise ResultError(f"{path}: its values are no whole numbers, so it has no labels; give --threshold")
-        values = values.astype(np.int64)
-    return values, None, []
+    if isinstance(source, Path) and source.suffix.lower() in LOSSY:
+        raise ResultError(f"{source}: JPEG changes the values of pixels, so it has no labels; give --threshold, or a "
+                          "PNG")
+    values = read_picture(source)
+    if values.ndim == 3:
+        colour = values.astype(np.int64)
+        return np.where(colour[..., 3] > 0, colour[..., 0] << 16 | colour[..., 1] << 8 | colour[..., 2], 0)
+    if values.dtype.kind == "f" and not (values == np.round(values)).all():
+        raise ResultError(f"{name_of(source)}: its values are no whole numbers, so it has no labels; give --threshold")
+    if values.min() < 0:
+        raise ResultError(f"{name_of(source)}: has the label {values.min():g}, but labels are whole numbers from 0 on; "
+                          "for a grey picture give --threshold")
+    return values.astype(np.int64)
 
 
-def _grey(path: Path, choices: Tracing) -> tuple[npt.NDArray[np.bool_], FloatArray, list[str]]:
-    """Where the grains of a grey picture are, and how far the grey value is above the threshold."""
-    filters = skimage("filters")
-    picture = _opened(path)
-    if picture.mode not in ("L", "I", "F", "I;16", "I;16B"):
-        picture = picture.convert("L")
-    grey = np.asarray(picture, dtype=float)
-    if choices.smooth is not None:
-        grey = filters.gaussian(grey, choices.smooth, preserve_range=True)
-    low, high = float(grey.min()), float(grey.max())
-    threshold = choices.threshold
-    if threshold == "otsu" and low < high:
-        bright = grey > filters.threshold_otsu(grey)
-        # In the middle of the two sorts, edges are where they are
-        threshold = 0.5 * float(grey[bright].mean() + grey[~bright].mean())
-    if isinstance(threshold, str) or threshold is None or not low < threshold < high:
-        raise ResultError(f"{path}: the threshold is {threshold}, but the grey values are from {low:g} to {high:g}")
-    level = (threshold - grey) if choices.dark else (grey - threshold)
-    side = "darker" if choices.dark else "brighter"
-    share = float((level > 0.0).mean())
-    said = f"grains are {side} than the grey value {threshold:.4g}: {100 * share:.0f} % of the area"
-    return level > 0.0, level, [said]
+def _grains(level: FloatArray, choices: Tracing, said: list[str]) -> IntArray:
+    """The grains of a grey picture that stay."""
+    label = _label(level > 0.0)
+    if choices.split is not None:
+        before = label.max()
+        label = _split(label, choices.split)
+        said.append(f"grains after the cuts of narrow necks: {label.max()}, before: {before}")
+    return _chosen(label, choices, said)
+
+
+def _at_other_thresholds(level: FloatArray, step: FloatArray, choices: Tracing, label: IntArray) -> str:
+    """What a slightly different threshold would change."""
+    others = [_grains(level + sign * step, choices, []) for sign in (1.0, -1.0)]
+    area = [100.0 * ((other > 0).sum() / max((label > 0).sum(), 1) - 1.0) for other in others]
+    number = [len(np.unique(other[other > 0])) for other in others]
+    words = " and ".join(f"{round(change, 1) + 0.0:+.1f} % (grains: {count})" for change, count in zip(area, number))
+    return (f"accuracy of the threshold: {float(np.median(step)):.2g} grey values ({100 * STEP:g} % of the difference "
+            f"between the means of the two sorts of pixels) nearer to the background, or farther from it, change the "
+            f"total area of all grains by {words}")
 
 
 def _split(label: IntArray, share: float) -> IntArray:
@@ -161,17 +154,17 @@ def _chosen(label: IntArray, choices: Tracing, said: list[str]) -> IntArray:
     least = LEAST if choices.least is None else choices.least
     rows, columns = label.shape
     out = np.zeros_like(label)
-    left = dict.fromkeys(("border", "small", "inside"), 0)
+    left: dict[str, list[int]] = {"border": [], "small": [], "inside": []}
     holes = 0
     inner: set[int] = set()
     for region in sorted(measure.regionprops(label), key=lambda each: (-each.area_filled, each.label)):
         top, first, bottom, last = region.bbox
         if region.label in inner:
-            left["inside"] += 1
+            left["inside"].append(int(region.area))
         elif region.area < least:
-            left["small"] += 1
+            left["small"].append(int(region.area))
         elif not choices.border and (top == 0 or first == 0 or bottom == rows or last == columns):
-            left["border"] += 1
+            left["border"].append(int(region.area))
         else:
             filled = region.image_filled
             window = np.s_[top:bottom, first:last]
@@ -179,9 +172,15 @@ def _chosen(label: IntArray, choices: Tracing, said: list[str]) -> IntArray:
             holes += int(measure.label(hole, connectivity=1).max()) if hole.any() else 0
             inner |= set(np.unique(label[window][hole]).tolist()) - {0}
             out[window][filled] = region.label
-    said += [sentence for sentence in (
-        f"left out, at the border of the picture: {left['border']} (--border keeps them)" if left["border"] else "",
-        f"left out, below {least:g} pixels: {left['small']} (--least)" if left["small"] else "",
-        f"left out, in holes of other grains: {left['inside']}" if left["inside"] else "",
-        f"holes that were filled: {holes}" if holes else "") if sentence]
+    for name, words, remedy in (("border", "at the border of the picture", "--border keeps them"),
+                                ("small", f"below {least:g} pixels", "--least"),
+                                ("inside", "in holes of other grains", "")):
+        if left[name]:
+            share = sum(left[name]) / label.size
+            uneven = name == "border" and choices.threshold is not None and not choices.uneven and (
+                share > SUSPECT or max(left[name]) > np.bincount(out.ravel())[1:].max(initial=0))
+            said.append(f"left out, {words}: {len(left[name])}, {100 * share:.2g} % of the picture"
+                        f"{f' ({remedy})' if remedy else ''}{'; uneven light? See --uneven' if uneven else ''}")
+    if holes:
+        said.append(f"holes that were filled: {holes}")
     return out

@@ -25,22 +25,28 @@ class Chain:
     owners: list[tuple[int, bool]]
 
 
-def simplified(numbers: list[IntArray], places: list[FloatArray], tolerance: FloatArray) -> list[FloatArray]:
+def simplified(numbers: list[IntArray], places: list[FloatArray], tolerance: FloatArray,
+               convex: bool = False) -> tuple[list[FloatArray], list[bool]]:
     """Outlines whose distance from the given ones is at most a tolerance of each grain; [tolerance] = [places].
 
     Lines between nodes, where three lines meet, are simplified once (Douglas & Peucker, Cartographica 10 (1973) 112)
-    with the tolerance of the smaller of the grains on their sides; dents of less than the tolerance are filled.
+    with the tolerance of the smaller of the grains on their sides; dents of less than the tolerance are filled. With
+    `convex` each grain becomes its convex hull, whatever the distance, unless the hull meets another grain; the second
+    list tells which did.
     """
     shapely = need("shapely", "pictures", "the import of pictures")
     steps = [1 if area_of(each) > 0.0 else -1 for each in places]
     places = [each[::step] for each, step in zip(places, steps)]
     numbers = [each[::step] for each, step in zip(numbers, steps)]
-    return _solved(shapely, places, tolerance, *_chains(numbers, places))
+    chains, parts, point, lone = _chains(numbers, places)
+    hulls = [_hull(shapely, place, each) if convex else None for place, each in zip(places, tolerance)]
+    outlines = _solved(shapely, places, tolerance, chains, parts, point, lone, hulls)
+    return outlines, [each is not None for each in hulls]
 
 
 def _solved(shapely: Any, places: list[FloatArray], tolerance: FloatArray, chains: list[Chain], parts: list[list[int]],
-            point: FloatArray, lone: list[bool]) -> list[FloatArray]:
-    """The simplified outlines, with less tolerance where they fail."""
+            point: FloatArray, lone: list[bool], hulls: list[FloatArray | None]) -> list[FloatArray]:
+    """The simplified outlines, or hulls; less tolerance where they fail, and None for a hull that does."""
     own = np.array(tolerance, dtype=float)
     lines: list[Any] = [None] * len(chains)
     stale = set(range(len(chains)))
@@ -48,20 +54,35 @@ def _solved(shapely: Any, places: list[FloatArray], tolerance: FloatArray, chain
         for k in stale:
             least = min(own[grain] for grain, _ in chains[k].owners)
             lines[k] = _line(shapely, chains[k], point, least)
-        rings = [np.concatenate([_directed(chains[k], lines[k], grain)[:-1] for k in parts[grain]])
-                 for grain in range(len(places))]
-        outlines = [_with_area(shapely, point[ring], places[grain], own[grain]) if lone[grain] else point[ring]
-                    for grain, ring in enumerate(rings)]
+        outlines: list[FloatArray] = []
+        for grain, (place, hull) in enumerate(zip(places, hulls)):
+            ring = point[np.concatenate([_directed(chains[k], lines[k], grain)[:-1] for k in parts[grain]])]
+            outline = with_area(shapely, ring, place, own[grain]) if lone[grain] else ring
+            outlines.append(outline if hull is None else hull)
         bad = _failing(shapely, outlines)
         if not bad:
             break
+        stale = set()
         for grain in bad:
+            if hulls[grain] is not None:
+                hulls[grain] = None
+                continue
             own[grain] = 0.5 * own[grain] if attempt < TRIES - 1 else 0.0
-        stale = {k for grain in bad for k in parts[grain]}
+            stale |= set(parts[grain])
     return outlines
 
 
-def _with_area(shapely: Any, outline: FloatArray, exact: FloatArray, tolerance: float) -> FloatArray:
+def _hull(shapely: Any, place: FloatArray, tolerance: float) -> FloatArray:
+    """The convex hull of a grain, with fewer corners but its area."""
+    exact = shapely.get_coordinates(shapely.convex_hull(shapely.Polygon(place)))[:-1]
+    exact = exact if area_of(exact) > 0.0 else exact[::-1]
+    begin = int(np.argmax(np.hypot(*(exact - exact.mean(axis=0)).T)))
+    closed = np.roll(exact, -begin, axis=0)[[*range(len(exact)), 0]]
+    line = shapely.get_coordinates(shapely.simplify(shapely.LineString(closed), tolerance, preserve_topology=False))
+    return with_area(shapely, line[:-1], exact, tolerance) if len(line) > 3 else exact
+
+
+def with_area(shapely: Any, outline: FloatArray, exact: FloatArray, tolerance: float) -> FloatArray:
     """The outline of a grain that touches none, scaled to its area, if that is within the tolerance."""
     if len(outline) < 3 or area_of(outline) <= 0.0 or tolerance <= 0.0:
         return outline
