@@ -171,7 +171,12 @@ contains
       if (.not. allocated(error)) then
          call enter(c_loc(made), self, error)
          call start_run(made%settings, mod(mode, 4_c_int) == mode_force, made%run, error, comm)
-         if (allocated(error)) call end_quietly(made)
+         if (allocated(error)) then
+            call end_quietly(made)
+         else if (.not. made%run%has_begun) then
+            call raise(error, input_error, made%run%folder//': the run is finished; resume it with a longer '// &
+                       'integrate.duration, or read its result')
+         end if
          call leave(made)
       end if
       if (allocated(error)) then

@@ -7,7 +7,7 @@ module polydem_begin_run
    use polydem_errors, only: error_t
    use polydem_file_system, only: make_folder
    use polydem_initial_warnings, only: warn_of_risks
-   use polydem_kinds, only: dp, ip
+   use polydem_kinds, only: dp, ip, lp
    use polydem_monitor, only: new_monitor
    use polydem_open_log, only: is_restart, open_log, write_overlaps
    use polydem_output_intervals, only: choose_intervals, frames_per_segment
@@ -40,7 +40,7 @@ contains
       call check_ranks(settings, run%comm, error)
       if (.not. (allocated(error) .or. run%options%has_files)) then
          call build_start(settings, run, error)
-         if (.not. allocated(error)) call take_record(run)
+         if (.not. allocated(error)) call take_record(run, 0_lp)
          if (.not. allocated(error)) call start_monitor(run)
          return
       end if
@@ -85,6 +85,7 @@ contains
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: step(1)
 
       run%oversubscription = oversubscription(run%comm)
       if (run%comm%is_root()) then
@@ -92,7 +93,10 @@ contains
       else
          call run%lock%join(run%folder)
       end if
-      if (.not. allocated(error)) call take_record(run)
+      ! The root alone has looked for a checkpoint.
+      step = run%previous%step
+      call run%comm%broadcast(step)
+      if (.not. allocated(error)) call take_record(run, step(1))
       if (run%comm%is_root()) call write_record(run, error)
       call run%comm%all_reduce_error(error)
    end subroutine describe_run

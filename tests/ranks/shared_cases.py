@@ -121,11 +121,33 @@ def write(namelist, folder, steps):
         return [sim.step]
 
 
+def react(folder, steps):
+    """A run that acts, in parts; what takes effect must be known on all processes after each start."""
+    with polydem.Simulation(HEAP, {"integrate.duration": 0.01}, folder=folder, resume=Path(folder).exists(),
+                            comm=COMM) as sim:
+        @sim.every(steps=50)
+        def push(sim):
+            sim.gravity = 1e-2 * sim.step, -9.81
+            sim.drag = 1e-3 * sim.step
+            sim.bodies.apply_force([100, 150], (1e-3 * sim.step, 0), 1e-6 * sim.step)
+
+        begin = list(sim.gravity), sim.drag, len(sim.actions)
+        sim.run(int(steps) or None)
+        return [*begin, sim.step, sim.state_hash]
+
+
 class Own(Exception):
     """An exception with two arguments, of which pickle would know one."""
 
     def __init__(self, one, other):
         super().__init__(f"{one} {other}")
+
+
+class Silent(Exception):
+    """An exception that can be neither sent nor shown."""
+
+    def __str__(self):
+        raise ValueError("no words")
 
 
 def disturb(sim):
@@ -144,6 +166,8 @@ def disturb(sim):
     if number == 6 and COMM is not None:
         sim.snapshot()
     if number == 7:
+        raise Silent(lambda: 0)
+    if number == 8:
         sim.stop("enough")
 
 
@@ -165,8 +189,12 @@ def fail():
             expect(kind, lambda: sim.run(1000))
         if COMM is not None:
             expect(polydem.InputError, lambda: sim.run(1000))
+        try:
+            sim.run(1000)
+        except (Silent, polydem.PolydemError) as error:
+            errors.append(type(error) is Silent or "Silent" in str(error))
         sim.run(1000)
-        assert (sim.step, sim.stopped) == (350, "enough")
+        assert (sim.step, sim.stopped) == (400, "enough")
         expect(polydem.InputError, lambda: setattr(sim, "drag", -1))
         expect(polydem.InputError, lambda: sim.bodies.apply_force([100000], (0, 0)))
         expect(polydem.InputError, lambda: sim.add([[(0, 0), (1, 0), (0, 1)]]))
@@ -177,7 +205,7 @@ def fail():
             expect(polydem.RunError, falling.run)
             assert np.isfinite(falling.frame().position).all()
             expect(polydem.RunError, falling.run)
-        other.run(350)
+        other.run(np.int64(400) if RANK else 400.0)
         assert sim.state_hash == other.state_hash
         expect(AttributeError, lambda: sim.bodies.colour)
     return errors
@@ -204,6 +232,8 @@ def part(way):
         if RANK == 0:
             print(sim, sim.time, len(sim.bodies), sim.actions, sim.settings.scene.name)
         sim.run(20)
+        if way == "late" and RANK == 1:
+            raise ZeroDivisionError("of one process")
     return [sim.stopped]
 
 
@@ -221,9 +251,20 @@ def forget(way):
 def divide(folder):
     """Two groups of processes, each with a simulation."""
     group = COMM.Split(RANK % 2, -RANK)
-    with polydem.Simulation(HEAP, {"scene.seed": RANK % 2 + 1}, comm=group) as sim:
+    refused = []
+
+    def look_at_other(sim):
+        try:
+            print(whole.state_hash)
+        except polydem.InputError as error:
+            refused.append(str(error))
+
+    with polydem.Simulation(HEAP, comm=COMM) as whole, \
+            polydem.Simulation(HEAP, {"scene.seed": RANK % 2 + 1}, comm=group) as sim:
+        sim.every(steps=100)(look_at_other)
         sim.run(200)
         seen = [RANK % 2, sim.state_hash]
+        assert len(refused) == (0 if group.rank else 2)
     try:
         polydem.Simulation(HEAP, comm=group, folder=folder)
     except polydem.InputError as error:

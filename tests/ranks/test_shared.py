@@ -75,6 +75,18 @@ def test_a_result_goes_on_with_other_processes(tmp_path):
     assert Trajectory(folder).state_hash == Trajectory(tmp_path / "whole").state_hash
 
 
+def test_a_result_with_actions_goes_on_with_other_processes(tmp_path):
+    (*_, last), = play("react", tmp_path / "one", [tmp_path / "whole", 0])[0]
+    for k, (ranks, steps) in enumerate(((2, 220), (3, 200), (None, 130), (2, 0))):
+        seen, _ = play("react", tmp_path / f"{k}", [tmp_path / "parts", steps], ranks)
+        assert all(each == seen[0] for each in seen)
+        assert seen[0][2] == (0, 12, 24, 33)[k], seen
+    assert seen[0][-1] == last
+    assert differences(frames(tmp_path / "whole"), frames(tmp_path / "parts")) == []
+    again, message = play("react", tmp_path / "again", [tmp_path / "parts", 0], 2, code=1)
+    assert not again and "the run is finished; resume it with a longer integrate.duration" in message
+
+
 def test_exceptions_reach_all_processes(tmp_path):
     (expected,), _ = play("fail", tmp_path / "one")
     root, *others = play("fail", tmp_path / "shared", ranks=3)[0]
@@ -91,14 +103,15 @@ def test_exceptions_reach_all_processes(tmp_path):
     ("steps", "process 0 makes run(10, None, None) of simulation 1, process 1 run(11, "),
     ("alone", "process 0 makes integer(contacts) of simulation 1, process 1 run(20, "),
     ("action", "process 0 makes act(drag, "),
-    ("error", "process 0 makes run(20, None, None) of simulation 1, process 1 close()"),
-    ("exit", "process 0 makes run(20, None, None) of simulation 1, process 1 close()"),
+    ("error", "process 0 makes run(20, None, None) of simulation 1, process 1 close after an error()"),
+    ("exit", "process 0 makes run(20, None, None) of simulation 1, process 1 close after an error()"),
+    ("late", "process 0 makes close() of simulation 1, process 1 close after an error()"),
     ("observer", "an observer runs on the root alone"),
 ))
 def test_processes_that_part_get_an_error(way, message, tmp_path):
     told = play("part", tmp_path / "out", [way], 3, code=1)[1]
     assert message in told
-    assert ("ZeroDivisionError: of one process" in told) == (way == "error")
+    assert ("ZeroDivisionError: of one process" in told) == (way in ("error", "late"))
 
 
 def test_what_nobody_closes_is_closed_at_the_end(tmp_path):

@@ -216,15 +216,15 @@ class Handle:
         self.meet("advance", steps, seconds)
         return int(self.call("advance", steps, seconds))
 
-    def close(self) -> None:
-        """End the run and free the simulation. A second call does nothing."""
+    def close(self, failed: bool = False) -> None:
+        """End the run and free the simulation, also after an error. A second call does nothing."""
         if self.pointer is None:
             return
         if self.ranks is not None:
             try:
-                self.ranks.agree("close", of=self)
+                self.ranks.agree("close after an error" if failed else "close", of=self)
             except InputError:
-                if self.pointer is not None:
+                if self.pointer is not None or not failed:
                     raise
                 return
         self.free()

@@ -9,7 +9,10 @@ from __future__ import annotations
 import atexit
 import hashlib
 import pickle
+import sys
 from collections.abc import Callable
+from contextlib import suppress
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,6 +52,7 @@ class Ranks:
         """Before a call that all processes must make: the root announces it in `run`, else they compare theirs."""
         if self._follows:
             return
+        self._refuse_others()
         if self._leads:
             self.comm.bcast((handle.number, method, arguments))
         else:
@@ -59,6 +63,7 @@ class Ranks:
         if self._leads:
             raise InputError("an observer runs on the root alone, where it can look and act; simulations are made, "
                              "run, copied, restored and closed outside of it, by all processes")
+        self._refuse_others()
         if self._ended:
             raise InputError("another process has ended")
         whose = f" of simulation {of.number}" if of is not None else ""
@@ -69,8 +74,16 @@ class Ranks:
         if self._ended or any(call.startswith("close") for call in calls):
             self.close_all()
         other = next(rank for rank, call in enumerate(calls) if call != calls[0])
-        raise InputError(f"all processes must make the same calls: process 0 makes {calls[0][:LONGEST]}, process "
-                         f"{other} {calls[other][:LONGEST]}")
+        same = next((k for k, (a, b) in enumerate(zip(calls[0], calls[other])) if a != b), len(calls[0]))
+        mine, theirs = (call[:LONGEST] if same < LONGEST // 2 else f"{call[:20]}...{call[same - 20:same + LONGEST]}"
+                        for call in (calls[0], calls[other]))
+        raise InputError(f"all processes must make the same calls: process 0 makes {mine}, process {other} {theirs}")
+
+    def _refuse_others(self) -> None:
+        """Nobody would answer an observer that uses a simulation of another communicator."""
+        if any(each._leads for each in _KNOWN if each is not self):
+            raise InputError("an observer runs on one process alone, and cannot use a simulation of another "
+                             "communicator")
 
     def run(self, handle: Handle, arguments: tuple[Any, ...], function: Callable[[], Any]) -> Any:
         """Call a function on the root; give its value, or raise its exception, on all processes."""
@@ -97,10 +110,9 @@ class Ranks:
                 number, method, arguments = self.comm.bcast(None)
                 if not method:
                     return tuple(arguments)
-                try:
+                # The root has the same exception, and its observer may go on.
+                with suppress(Exception):
                     getattr(self.handles[number], method)(*arguments)
-                except PolydemError:
-                    pass    # The root has the same one, and its observer may go on.
         finally:
             self._follows = False
 
@@ -133,14 +145,13 @@ def ranks_of(comm: Any) -> Ranks | None:
     """The processes of a communicator; None: this one alone."""
     if comm is None:
         return None
-    if not hasattr(comm, "py2f") or comm.Is_inter():
+    mpi = sys.modules.get("mpi4py.MPI")    # Whoever has a communicator has imported it.
+    if mpi is None or not isinstance(comm, mpi.Intracomm) or comm == mpi.COMM_NULL:
         raise InputError(f"comm is an intracommunicator of mpi4py, such as MPI.COMM_WORLD, not {comm!r}")
     if comm.size == 1:
         return None
-    from mpi4py import MPI
-
     for known in _KNOWN:
-        if MPI.Comm.Compare(comm, known.comm) in (MPI.IDENT, MPI.CONGRUENT):
+        if mpi.Comm.Compare(comm, known.comm) in (mpi.IDENT, mpi.CONGRUENT):
             return known
     _KNOWN.append(Ranks(comm))
     return _KNOWN[-1]
@@ -152,6 +163,9 @@ def _described(value: Any) -> str:
         value = f"{value.dtype}{value.shape} {hashlib.sha256(value.tobytes()).hexdigest()[:16]}"
     elif isinstance(value, str) and "\n" in value:
         value = hashlib.sha256(value.encode()).hexdigest()[:16]
+    elif isinstance(value, Real):
+        number = float(value)
+        value = int(number) if number.is_integer() else number
     return value if isinstance(value, str) else repr(value)
 
 
@@ -160,5 +174,8 @@ def _sendable(error: BaseException | None) -> BaseException | None:
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:    # Whatever pickle makes of it
-        return PolydemError(f"an observer has failed on the root: {type(error).__name__}: {error}")
+        words = ""
+        with suppress(Exception):
+            words = f": {error}"
+        return PolydemError(f"an observer has failed on the root: {type(error).__name__}{words}")
     return error

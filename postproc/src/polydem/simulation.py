@@ -92,7 +92,7 @@ class Simulation(Strict):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         """Close it."""
-        self.close()
+        self._handle.close(kind is not None)
 
     def __del__(self) -> None:
         # Several processes may not come here at the same time: theirs are closed at the end of the program.

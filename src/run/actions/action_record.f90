@@ -127,9 +127,11 @@ contains
 
    !> Give the actions to the simulation. A program that resumes a run records its actions after the checkpoint again;
    !> those that it recorded directly after the step of the checkpoint have yet to take effect.
-   subroutine take_record(run)
+   subroutine take_record(run, step)
       !> The run with its simulation, before a checkpoint is restored
       type(run_t), intent(inout) :: run
+      !> Step of the checkpoint; 0: there is none
+      integer(lp), intent(in) :: step
       integer :: k
 
       if (.not. allocated(run%actions)) return
@@ -139,7 +141,7 @@ contains
          end do
          if (run%options%is_guest .and. run%options%continues) then
             do while (actions%n > 0)
-               if (actions%list(actions%n)%step <= run%previous%step) exit
+               if (actions%list(actions%n)%step <= step) exit
                actions%n = actions%n - 1
             end do
          end if
