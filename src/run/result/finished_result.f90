@@ -169,7 +169,8 @@ contains
       found = merge(1_lp, 0_lp, allocated(last_state))
       call run%comm%broadcast(found)
       is_finished = found(1) == 1_lp
-      if (is_finished .and. run%comm%is_root() .and. .not. run%options%is_guest) call report_finished(run%folder, last_state)
+      if (is_finished .and. run%comm%is_root() .and. .not. run%options%is_guest) &
+         call report_finished(run%folder, last_state)
    end function is_finished
 
    !> Report on the screen that the result is finished, and its state hash.
