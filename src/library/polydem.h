@@ -45,7 +45,8 @@ long polydem_error_message(polydem_error error, char *buffer, long size);
  *   text       the namelist; null: it is read from the file
  *   overrides  n_overrides texts "group.key=value" or "group.name.key=value"
  *   folder     folder of the result, which is that of `polydem run`; null: nothing is written
- *   mode       POLYDEM_NEW, POLYDEM_FORCE or POLYDEM_CONTINUE, or one of them + POLYDEM_EXCHANGE
+ *   mode       POLYDEM_NEW, POLYDEM_FORCE or POLYDEM_CONTINUE, or one of them + POLYDEM_EXCHANGE; to continue a
+ *              finished run is an error, unless it shall be longer
  *   threads    number of OpenMP threads; 0: one */
 polydem_simulation polydem_new_simulation(polydem_error error, const char *file, const char *text, long n_overrides,
                                           const char *const *overrides, const char *folder, int mode, int threads);

@@ -350,6 +350,24 @@ def test_a_notebook_draws_a_simulation():
         assert sim._repr_png_() == sim.frame()._repr_png_() != b""
 
 
+def test_a_finished_run_goes_on_only_if_it_shall_be_longer(tmp_path):
+    script = """if True:
+        import sys, polydem
+        for steps, resume in (100, False), (100, True), (150, True):
+            settings = {"integrate.dt": 1e-5, "integrate.duration": steps * 1e-5}
+            try:
+                with polydem.Simulation(sys.argv[1], settings, folder=sys.argv[2], resume=resume) as sim:
+                    sim.run()
+                    print(sim.step)
+            except polydem.InputError as error:
+                print(error)
+    """
+    done = subprocess.run([sys.executable, "-c", script, str(ROOT / "inputs/first.nml"), str(tmp_path / "result")],
+                          check=True, capture_output=True, text=True)
+    assert done.stdout.splitlines() == ["100", f"{tmp_path / 'result'}: the run is finished; resume it with a longer "
+                                        "integrate.duration, or read its result", "150"]
+
+
 def test_another_library_is_refused():
     path = next(line.split()[-1] for line in Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
                 if "/libc.so" in line)

@@ -259,6 +259,11 @@ def test_what_the_program_refuses_is_refused(points, tmp_path):
         write_bodies([points], tmp_path / "out.h5")
 
 
+def test_coordinates_that_cannot_be_computed_with_are_refused(tmp_path):
+    with pytest.raises(ResultError, match=r"cannot be a body: a coordinate is beyond 1e\+50 m"):
+        write_bodies([[(0, 0), (1e200, 0), (0, 1)]], tmp_path / "out.h5")
+
+
 def test_a_small_deviation_is_visible_at_large_coordinates(tmp_path):
     with pytest.raises(ResultError, match=r"concave at the vertex \(6000000.5, 6000000.00000003"):
         write_bodies([CONCAVE[1]], tmp_path / "out.h5")
